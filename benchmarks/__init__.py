@@ -1,0 +1,1 @@
+"""Speed, accuracy and failure measurements, made through the engine's public face."""

@@ -1,0 +1,1 @@
+"""Other physics engines on the benchmark scenes."""

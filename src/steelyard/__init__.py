@@ -1,0 +1,28 @@
+"""Steelyard: a batched physics engine that lets you weigh speed against accuracy."""
+
+from . import draw
+from .integrators.closed_form import ClosedForm, flight_impact
+from .integrators.explicit_euler import ExplicitEuler
+from .integrators.rattle import Rattle
+from .integrators.symplectic_euler import SymplecticEuler
+from .methods import Method
+from .scene.contacts import ContactGenerator, Ground, LinePlatform
+from .scene.forces import (
+    AnchoredBungee,
+    AnchoredSpring,
+    Bungee,
+    Buoyancy,
+    Drag,
+    Gravity,
+    Spring,
+    StiffSpring,
+    UserForce,
+)
+from .scene.links import Cable, CableConstraint, Rod, RodConstraint
+from .scene.particle import Particle
+from .scene.rider import Rider
+from .scene.scene import Scene
+from .solvers.direct import Direct
+from .solvers.gauss_seidel import GaussSeidel
+from .solvers.worst_first import WorstFirst
+from .world import World

@@ -1,0 +1,96 @@
+"""Contact geometry: normal and gap of every pair that may touch, at the start of a step."""
+
+from __future__ import annotations
+
+from ..kernel import kernel
+from ..math.lanes import fma, load, select, splat, sqrt, store
+from ..model.tape import CONTACT, GROUND, H_CONTACTS, LINE
+
+
+@kernel
+def _ground(s, contact, tape):
+    """Half-space: gap = n . x - height - radius."""
+    x = tape[contact + 1]
+    plane = tape[contact + 11]
+    frame = tape[contact + 16]
+    gap = splat(0.0) - load(s, plane + 3) - load(s, tape[contact + 12])
+    for component in range(3):
+        normal = load(s, plane + component)
+        store(s, frame + component, normal)
+        gap = fma(normal, load(s, x + component), gap)
+    store(s, tape[contact + 17], gap)
+
+
+@kernel
+def _line(s, contact, tape):
+    """Segment: from the nearest point of the line to the particle; up where they coincide."""
+    zero = splat(0.0)
+    one = splat(1.0)
+    x = tape[contact + 1]
+    line = tape[contact + 11]
+    frame = tape[contact + 16]
+    ax = load(s, line + 3) - load(s, line)
+    ay = load(s, line + 4) - load(s, line + 1)
+    az = load(s, line + 5) - load(s, line + 2)
+    px = load(s, x) - load(s, line)
+    py = load(s, x + 1) - load(s, line + 1)
+    pz = load(s, x + 2) - load(s, line + 2)
+    along = fma(pz, az, fma(py, ay, px * ax)) / fma(az, az, fma(ay, ay, ax * ax))
+    along = select(along > zero, along, zero)
+    along = select(along < one, along, one)
+    dx = px - along * ax
+    dy = py - along * ay
+    dz = pz - along * az
+    distance = sqrt(fma(dz, dz, fma(dy, dy, dx * dx)))
+    apart = distance > zero
+    store(s, frame, select(apart, dx / distance, zero))
+    store(s, frame + 1, select(apart, dy / distance, one))
+    store(s, frame + 2, select(apart, dz / distance, zero))
+    store(s, tape[contact + 17], distance - load(s, line + 6) - load(s, tape[contact + 12]))
+
+
+@kernel
+def _user(s, contact, tape):
+    """Written by the user: normal and penetration lie in the state; 0 or less is no contact."""
+    given = tape[contact + 11]
+    frame = tape[contact + 16]
+    for component in range(3):
+        store(s, frame + component, load(s, given + component))
+    depth = load(s, given + 3)
+    far = splat(1e9)
+    store(s, tape[contact + 17], select(depth > splat(0.0), splat(0.0) - depth, far))
+
+
+@kernel
+def _tangents(s, frame):
+    """Complete the frame with two tangents (Duff et al. 2017, eq. 3), continuous except at n_z = 0."""
+    zero = splat(0.0)
+    one = splat(1.0)
+    nx = load(s, frame)
+    ny = load(s, frame + 1)
+    nz = load(s, frame + 2)
+    sign = select(nz < zero, zero - one, one)
+    a = (zero - one) / (sign + nz)
+    b = nx * ny * a
+    store(s, frame + 3, one + sign * nx * nx * a)
+    store(s, frame + 4, sign * b)
+    store(s, frame + 5, zero - sign * nx)
+    store(s, frame + 6, b)
+    store(s, frame + 7, sign + ny * ny * a)
+    store(s, frame + 8, zero - ny)
+
+
+@kernel
+def contact_geometry(tape, s):
+    """Frame (normal, two tangents) and gap of every contact at the current positions."""
+    at = tape[H_CONTACTS]
+    for index in range(tape[at]):
+        contact = at + 1 + CONTACT * index
+        kind = tape[contact]
+        if kind == GROUND:
+            _ground(s, contact, tape)
+        elif kind == LINE:
+            _line(s, contact, tape)
+        else:
+            _user(s, contact, tape)
+        _tangents(s, tape[contact + 16])

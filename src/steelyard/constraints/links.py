@@ -1,0 +1,94 @@
+"""Rods and cables: gradients, residuals and impulses.
+
+With d = x_a - x_b a link holds g = (d.d - L^2)/2 = 0 (rod) or g <= 0 (cable). No square root is needed: the
+gradient of g is d at a and -d at b. The impulse is minus the multiplier times it, so tension is positive;
+the multiplier is a mass.
+"""
+
+from __future__ import annotations
+
+from ..kernel import kernel
+from ..math.lanes import fma, load, select, splat, store
+from ..model.tape import H_LINKS, LINK
+
+
+@kernel
+def link_half_square(s, link, tape, length):
+    """(d.d - L^2)/2 at the current positions."""
+    xa = tape[link]
+    xb = tape[link + 1]
+    dx = load(s, xa) - load(s, xb)
+    dy = load(s, xa + 1) - load(s, xb + 1)
+    dz = load(s, xa + 2) - load(s, xb + 2)
+    square = fma(dz, dz, fma(dy, dy, dx * dx))
+    return splat(0.5) * fma(splat(0.0) - length, length, square)
+
+
+@kernel
+def link_rate(s, link, tape):
+    """d . (v_a - v_b) with the stored gradient d."""
+    va = tape[link + 2]
+    vb = tape[link + 3]
+    d = tape[link + 13]
+    rate = load(s, d) * (load(s, va) - load(s, vb))
+    rate = fma(load(s, d + 1), load(s, va + 1) - load(s, vb + 1), rate)
+    return fma(load(s, d + 2), load(s, va + 2) - load(s, vb + 2), rate)
+
+
+@kernel
+def link_gradients(tape, s):
+    """Store d = x_a - x_b of every link."""
+    at = tape[H_LINKS]
+    for index in range(tape[at]):
+        link = at + 1 + LINK * index
+        xa = tape[link]
+        xb = tape[link + 1]
+        d = tape[link + 13]
+        for component in range(3):
+            store(s, d + component, load(s, xa + component) - load(s, xb + component))
+
+
+@kernel
+def link_targets(tape, s):
+    """Rate of g each link must have after the step, decided at its start.
+
+    A rod or taut cable follows its winch: L dL/dt. A cable that is closing on its end rebounds: minus
+    restitution times the closing rate beyond the winch's. A cable overstretched at the start is held
+    like a rod, so that pulling it back leaves no velocity.
+    """
+    at = tape[H_LINKS]
+    zero = splat(0.0)
+    for index in range(tape[at]):
+        link = at + 1 + LINK * index
+        length = load(s, tape[link + 8])
+        follow = length * load(s, tape[link + 9])
+        if tape[link + 10] == 0:
+            store(s, tape[link + 14], follow)
+        else:
+            closing = link_rate(s, link, tape) - follow
+            rebound = select(closing > zero, closing * load(s, tape[link + 11]), zero)
+            store(s, tape[link + 14], follow - rebound)
+            over = link_half_square(s, link, tape, length) > splat(1e-9) * length * length
+            store(s, tape[link + 14] + 1, select(over, splat(1.0), zero))
+
+
+@kernel
+def link_multiplier(tape, link, velocity):
+    """Row of a link's multiplier: of the position stage, or of the velocity stage."""
+    return tape[link + 14] + 2 if velocity else tape[link + 12]
+
+
+@kernel
+def link_impulses(tape, s, velocity):
+    """Add every multiplier's impulse to the particles' impulse rows."""
+    at = tape[H_LINKS]
+    for index in range(tape[at]):
+        link = at + 1 + LINK * index
+        fa = tape[link + 4]
+        fb = tape[link + 5]
+        multiplier = load(s, link_multiplier(tape, link, velocity))
+        d = tape[link + 13]
+        for component in range(3):
+            part = multiplier * load(s, d + component)
+            store(s, fa + component, load(s, fa + component) - part)
+            store(s, fb + component, load(s, fb + component) + part)

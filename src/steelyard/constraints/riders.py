@@ -1,0 +1,86 @@
+"""Riders: a particle held at the weighted mean of others, x = sum of w_i x_i, three rows each.
+
+Record on the tape: x, v, impulse, multipliers, slot, inverse mass, count of deck particles, weights, rates, work
+rows (coefficients, then velocity multipliers), then per deck particle: x, v, impulse, inverse mass.
+"""
+
+from __future__ import annotations
+
+from ..kernel import kernel
+from ..math.lanes import fma, load, splat, store
+from ..model.tape import H_RIDERS
+
+HEAD = 10
+DECK = 4
+
+
+@kernel
+def rider_offset(s, tape, rider, component):
+    """x - sum of w_i x_i, one component."""
+    zero = splat(0.0)
+    weights = tape[rider + 7]
+    value = load(s, tape[rider] + component)
+    for k in range(tape[rider + 6]):
+        x = tape[rider + HEAD + DECK * k]
+        value = fma(zero - load(s, weights + k), load(s, x + component), value)
+    return value
+
+
+@kernel
+def rider_slip(s, tape, rider, component):
+    """v - sum of (w_i v_i + dw_i/dt x_i), one component."""
+    zero = splat(0.0)
+    weights = tape[rider + 7]
+    rates = tape[rider + 8]
+    value = load(s, tape[rider + 1] + component)
+    for k in range(tape[rider + 6]):
+        deck = rider + HEAD + DECK * k
+        value = fma(zero - load(s, weights + k), load(s, tape[deck + 1] + component), value)
+        value = fma(zero - load(s, rates + k), load(s, tape[deck] + component), value)
+    return value
+
+
+@kernel
+def rider_coefficients(tape, s):
+    """Keep minus the present weights, the deck's coefficients: they direct the impulses."""
+    at = tape[H_RIDERS] + 1
+    for _ in range(tape[tape[H_RIDERS]]):
+        count = tape[at + 6]
+        for k in range(count):
+            store(s, tape[at + 9] + k, splat(0.0) - load(s, tape[at + 7] + k))
+        at += HEAD + DECK * count
+
+
+@kernel
+def rider_advance(tape, s, dt):
+    """Move the weights by their rates over ``dt``."""
+    at = tape[H_RIDERS] + 1
+    for _ in range(tape[tape[H_RIDERS]]):
+        count = tape[at + 6]
+        for k in range(count):
+            rate = load(s, tape[at + 8] + k)
+            store(s, tape[at + 7] + k, fma(dt, rate, load(s, tape[at + 7] + k)))
+        at += HEAD + DECK * count
+
+
+@kernel
+def rider_multiplier(tape, rider, velocity):
+    """First row of a rider's multipliers: of the position stage, or of the velocity stage."""
+    return tape[rider + 9] + tape[rider + 6] if velocity else tape[rider + 3]
+
+
+@kernel
+def rider_impulses(tape, s, velocity):
+    """Add every rider's impulse to the load and, weighted, with the opposite sign to its deck."""
+    at = tape[H_RIDERS] + 1
+    for _ in range(tape[tape[H_RIDERS]]):
+        count = tape[at + 6]
+        for component in range(3):
+            part = load(s, rider_multiplier(tape, at, velocity) + component)
+            f = tape[at + 2] + component
+            store(s, f, load(s, f) + part)
+            for k in range(count):
+                f = tape[at + HEAD + DECK * k + 2] + component
+                coefficient = load(s, tape[at + 9] + k)
+                store(s, f, fma(coefficient, part, load(s, f)))
+        at += HEAD + DECK * count

@@ -1,0 +1,81 @@
+"""Energy of every world: kinetic, gravity and whatever the forces store."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..scene.forces import (
+    AnchoredBungee,
+    AnchoredSpring,
+    Bungee,
+    Buoyancy,
+    Gravity,
+    Spring,
+    StiffSpring,
+    UserForce,
+)
+
+if TYPE_CHECKING:
+    from ..world import World
+
+
+def kinetic_energy(world: World) -> np.ndarray:
+    """Sum of m v^2 / 2 [J], shape (worlds,)."""
+    speed = (world.particles.velocity**2).sum(axis=2)
+    return 0.5 * (world.particles.mass_or_zero * speed).sum(axis=1)
+
+
+def potential_energy(world: World) -> np.ndarray:
+    """Energy of constant accelerations and of the forces that have one [J], shape (worlds,).
+
+    Drag has none; a user-written force counts where it brings its ``energy``.
+    """
+    particles = world.particles
+    height = (particles.acceleration * particles.position).sum(axis=2)
+    total = -(particles.mass_or_zero * height).sum(axis=1)
+    for force in world.scene.things:
+        if isinstance(force, Spring | AnchoredSpring | StiffSpring):
+            total = total + _spring(world, force)
+        elif isinstance(force, Buoyancy):
+            total = total + _buoyancy(world, force)
+        elif isinstance(force, Gravity):
+            chosen = force.particles or world.scene.particles
+            for p in map(world._index, chosen):
+                along = (world[force].acceleration * particles.position[:, p]).sum(axis=-1)
+                total = total - particles.mass_or_zero[:, p] * along
+        elif isinstance(force, UserForce) and force.energy is not None:
+            total = total + np.asarray(force.energy(particles.position))
+    return total
+
+
+def _spring(world: World, force: Any) -> np.ndarray:
+    """k (l - l0)^2 / 2; for a bungee only where it is stretched."""
+    position = world.particles.position
+    handle = world[force]
+    if isinstance(force, Spring):
+        apart = position[:, world._index(force.a)] - position[:, world._index(force.b)]
+    else:
+        apart = position[:, world._index(force.particle)] - handle.anchor
+    rest = 0.0 if isinstance(force, StiffSpring) else handle.rest_length
+    stretch = np.linalg.norm(apart, axis=1) - rest
+    if isinstance(force, Bungee | AnchoredBungee):
+        stretch = np.maximum(stretch, 0.0)
+    return 0.5 * handle.stiffness * stretch**2
+
+
+def _buoyancy(world: World, force: Buoyancy) -> np.ndarray:
+    """Minus the integral of the lift from high above down to the float."""
+    handle = world[force]
+    y = world.particles.position[:, world._index(force.particle), 1]
+    lift = handle.volume * handle.density * handle.gravity
+    half = handle.half_depth
+    depth = handle.surface + half - y
+    partial = np.clip(depth, 0.0, 2 * half)
+    return lift * (partial**2 / (4 * half) + np.maximum(depth - 2 * half, 0.0))
+
+
+def world_energy(world: World) -> np.ndarray:
+    """Kinetic plus potential energy [J], shape (worlds,)."""
+    return kinetic_energy(world) + potential_energy(world)

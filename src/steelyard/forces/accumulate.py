@@ -1,0 +1,28 @@
+"""The sum of all forces on every particle (d'Alembert)."""
+
+from __future__ import annotations
+
+from ..kernel import kernel
+from ..math.lanes import load, splat, store
+from ..model.tape import H_FORCE, H_FORCED, H_PARTICLES, H_USER_FORCES
+from .buoyancy import add_buoyancy
+from .gravity import add_gravity
+from .springs import add_springs
+
+
+@kernel
+def accumulate_forces(tape, s):
+    """Clear the force rows and add all forces but drag, which integrators treat in their own way."""
+    if tape[H_FORCED] == 0:
+        return
+    zero = splat(0.0)
+    for row in range(3 * tape[H_PARTICLES] + 3):
+        store(s, tape[H_FORCE] + row, zero)
+    add_springs(tape, s)
+    add_gravity(tape, s)
+    add_buoyancy(tape, s)
+    given = tape[H_USER_FORCES]
+    if given >= 0:
+        for row in range(3 * tape[H_PARTICLES]):
+            f = tape[H_FORCE] + row
+            store(s, f, load(s, f) + load(s, given + row))

@@ -1,0 +1,43 @@
+"""Springs and bungees: F = -k (l - l0) n, n from the other end to this one.
+
+Record: x_a, x_b, force_a, force_b, stiffness, rest length, one-sided (bungee). Where the ends coincide the
+direction, and so the force, is taken as zero. Energy k (l - l0)^2 / 2.
+"""
+
+from __future__ import annotations
+
+from ..kernel import kernel
+from ..math.lanes import fma, load, select, splat, sqrt, store
+from ..model.tape import H_SPRINGS
+
+RECORD = 7
+
+
+@kernel
+def add_springs(tape, s):
+    """Add every spring's force to the force rows."""
+    zero = splat(0.0)
+    at = tape[H_SPRINGS]
+    for index in range(tape[at]):
+        k = at + 1 + RECORD * index
+        a = tape[k]
+        b = tape[k + 1]
+        x = load(s, a) - load(s, b)
+        y = load(s, a + 1) - load(s, b + 1)
+        z = load(s, a + 2) - load(s, b + 2)
+        length = sqrt(fma(z, z, fma(y, y, x * x)))
+        stretch = length - load(s, tape[k + 5])
+        if tape[k + 6] != 0:
+            stretch = select(stretch > zero, stretch, zero)
+        apart = length > zero
+        pull = load(s, tape[k + 4]) * stretch / select(apart, length, splat(1.0))
+        pull = select(apart, zero - pull, zero)
+        fa = tape[k + 2]
+        fb = tape[k + 3]
+        store(s, fa, fma(pull, x, load(s, fa)))
+        store(s, fa + 1, fma(pull, y, load(s, fa + 1)))
+        store(s, fa + 2, fma(pull, z, load(s, fa + 2)))
+        push = zero - pull
+        store(s, fb, fma(push, x, load(s, fb)))
+        store(s, fb + 1, fma(push, y, load(s, fb + 1)))
+        store(s, fb + 2, fma(push, z, load(s, fb + 2)))

@@ -1,0 +1,152 @@
+"""Closed-form flight: constant acceleration and linear damping, nothing else.
+
+dv/dt = a - c v with c = -ln(damping) has, over any time t,
+
+    v(t) = v0 e^(-ct) + a phi1(t),    x(t) = x0 + v0 phi1(t) + a phi2(t),
+    phi1 = (1 - e^(-ct))/c,    phi2 = (t - phi1)/c,
+
+so a step of any size is exact and steps compose without error. Invariants: all of the motion's. Refuses
+forces, links, riders and contacts.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from ..kernel import kernel
+from ..math.lanes import fma, load, store
+from ..model.tape import CLOSED_FORM, H_ACCELERATION, H_DAMPING, H_DRIFT, H_POSITION, H_VELOCITY
+from .base import Integrator
+
+
+@dataclass(frozen=True)
+class ClosedForm(Integrator):
+    """Exact flight of free particles (see the module)."""
+
+    code: ClassVar[int] = CLOSED_FORM
+
+    def order(self) -> int:
+        """Exact: any order; 0 says that no slope can be measured."""
+        return 0
+
+    def stable_limit(self) -> float:
+        """No spring is accepted."""
+        return math.inf
+
+
+@kernel
+def closed_form_step(tape, s):
+    """Rows H_DAMPING: per particle e^(-ch), phi1(h), phi2(h)."""
+    at = tape[H_DRIFT]
+    for index in range(tape[at]):
+        p = tape[at + 1 + index]
+        decay = load(s, tape[H_DAMPING] + 3 * p)
+        phi1 = load(s, tape[H_DAMPING] + 3 * p + 1)
+        phi2 = load(s, tape[H_DAMPING] + 3 * p + 2)
+        for component in range(3):
+            row = 3 * p + component
+            a = load(s, tape[H_ACCELERATION] + row)
+            v = load(s, tape[H_VELOCITY] + row)
+            x = load(s, tape[H_POSITION] + row)
+            store(s, tape[H_POSITION] + row, fma(a, phi2, fma(v, phi1, x)))
+            store(s, tape[H_VELOCITY] + row, fma(a, phi1, v * decay))
+
+
+@kernel
+def _phi(rate, time):
+    """e^(-ct), phi1 and phi2, by series where c t is small."""
+    z = rate * time
+    if abs(z) < 1e-2:
+        one = 1.0 - z / 2 * (1.0 - z / 3 * (1.0 - z / 4 * (1.0 - z / 5 * (1.0 - z / 6 * (1.0 - z / 7)))))
+        two = 0.5 * (1.0 - z / 3 * (1.0 - z / 4 * (1.0 - z / 5 * (1.0 - z / 6 * (1.0 - z / 7)))))
+        return math.exp(-z), time * one, time * time * two
+    one = -math.expm1(-z) / rate
+    return math.exp(-z), one, (time - one) / rate
+
+
+@kernel
+def flight(position, velocity, acceleration, rate, time):
+    """Place and speed along one axis after ``time``; ``rate`` is c = -ln(damping) [1/s]."""
+    decay, phi1, phi2 = _phi(rate, time)
+    return (
+        position + velocity * phi1 + acceleration * phi2,
+        velocity * decay + acceleration * phi1,
+    )
+
+
+@kernel
+def flight_fall_time(height, velocity, acceleration, rate):
+    """Time until a particle ``height`` above a level falls through it; inf if it never does.
+
+    Newton's method from a time past the impact: beyond the apex the height is concave, so the iteration
+    falls onto the root from above without overshooting.
+    """
+    if height < 0.0 or (height == 0.0 and velocity <= 0.0):
+        return 0.0
+    if acceleration >= 0.0:
+        if acceleration > 0.0 or velocity >= 0.0:
+            return math.inf
+        reach = height + velocity / rate if rate > 0.0 else -1.0
+        if reach >= 0.0:
+            return math.inf
+    # The undamped fall is no later for v <= 0; rising, damping only shortens the rise. Double until below.
+    time = 1e-3
+    if acceleration < 0.0:
+        root = math.sqrt(velocity * velocity - 2.0 * acceleration * height)
+        time = max((velocity + root) / -acceleration, 1e-9)
+    while flight(height, velocity, acceleration, rate, time)[0] > 0.0:
+        time *= 2.0
+    for _ in range(100):
+        place, speed = flight(height, velocity, acceleration, rate, time)
+        change = place / speed
+        time -= change
+        if abs(change) <= 2e-16 * time:
+            break
+    return time
+
+
+def flight_impact(
+    position: np.ndarray,
+    velocity: np.ndarray,
+    *,
+    acceleration: tuple[float, float, float] = (0.0, -9.81, 0.0),
+    damping: float = 1.0,
+    height: float = 0.0,
+) -> tuple[np.ndarray, np.ndarray]:
+    """When and where particles in free flight fall through a level.
+
+    Args:
+        position: (..., 3) [m].
+        velocity: (..., 3) [m/s].
+        acceleration: constant acceleration [m/s^2].
+        damping: fraction of velocity kept per second, in (0, 1].
+        height: level [m].
+
+    Returns:
+        Times (...) [s], inf where it never falls through, and places (..., 3) [m], NaN there.
+
+    Raises:
+        ValueError: damping out of range.
+    """
+    if not 0.0 < damping <= 1.0:
+        raise ValueError(
+            f"flight_impact: damping is {damping!r}; it must be in (0, 1]. Use 1 for no damping."
+        )
+    x = np.asarray(position, dtype=np.float64)
+    v = np.asarray(velocity, dtype=np.float64)
+    shape = np.broadcast_shapes(x.shape, v.shape)
+    points = np.broadcast_to(x, shape).reshape(-1, 3)
+    speeds = np.broadcast_to(v, shape).reshape(-1, 3)
+    rate = -math.log(damping)
+    times = np.empty(len(points))
+    places = np.full((len(points), 3), np.nan)
+    for k, (point, speed) in enumerate(zip(points, speeds, strict=True)):
+        times[k] = flight_fall_time(point[1] - height, speed[1], acceleration[1], rate)
+        if math.isfinite(times[k]):
+            for c in range(3):
+                places[k, c] = flight(point[c], speed[c], float(acceleration[c]), rate, times[k])[0]
+    return times.reshape(shape[:-1]), places.reshape(shape)

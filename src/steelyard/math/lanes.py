@@ -1,0 +1,190 @@
+"""Eight worlds in one register: the arithmetic that the stepping kernels are written in.
+
+A *lane vector* holds one number for each of ``LANES`` neighbouring worlds. Kernels load it from a row of a
+scratch array of shape (rows, LANES), compute on it as on a scalar and store it back. Each operation is one
+IEEE operation per world, whatever the other seven hold: results cannot depend on the place of a world in
+a batch, and there is no remainder loop. ``fma`` rounds once; plain ``a * b + c`` is never contracted.
+
+Lane values exist only inside kernels. LLVM maps them to AVX-512, AVX2, SSE2 or NEON registers.
+"""
+
+from __future__ import annotations
+
+import operator
+from typing import Any
+
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.core.extending import intrinsic, lower_builtin, models, register_model
+from numba.core.typing.templates import AbstractTemplate, infer_global, signature
+
+LANES = 8
+
+_DOUBLES = ir.VectorType(ir.DoubleType(), LANES)
+_BITS = ir.VectorType(ir.IntType(1), LANES)
+_BYTE = ir.IntType(LANES)
+
+
+class LaneType(types.Type):
+    """One float64 per world of a block."""
+
+    def __init__(self) -> None:
+        super().__init__(name=f"Lane{LANES}")
+
+
+class MaskType(types.Type):
+    """One truth value per world of a block."""
+
+    def __init__(self) -> None:
+        super().__init__(name=f"Mask{LANES}")
+
+
+lane = LaneType()
+mask = MaskType()
+
+
+@register_model(LaneType)
+class _LaneModel(models.PrimitiveModel):
+    def __init__(self, manager: Any, frontend: Any) -> None:
+        super().__init__(manager, frontend, _DOUBLES)
+
+
+@register_model(MaskType)
+class _MaskModel(models.PrimitiveModel):
+    def __init__(self, manager: Any, frontend: Any) -> None:
+        super().__init__(manager, frontend, _BITS)
+
+
+def _pointer(context: Any, builder: Any, array_type: Any, array: Any, row: Any) -> Any:
+    data = context.make_array(array_type)(context, builder, array).data
+    start = builder.gep(data, [builder.mul(row, ir.Constant(ir.IntType(64), LANES))])
+    return builder.bitcast(start, _DOUBLES.as_pointer())
+
+
+@intrinsic
+def load(typing_context: Any, rows: Any, row: Any) -> Any:
+    """Lane vector in row ``row`` of a C-contiguous scratch of shape (rows, LANES)."""
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return builder.load(_pointer(context, builder, sig.args[0], args[0], args[1]), align=8)
+
+    return lane(rows, types.int64), codegen
+
+
+@intrinsic
+def store(typing_context: Any, rows: Any, row: Any, value: Any) -> Any:
+    """Write a lane vector to row ``row`` of a scratch of shape (rows, LANES)."""
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        builder.store(args[2], _pointer(context, builder, sig.args[0], args[0], args[1]), align=8)
+        return context.get_dummy_value()
+
+    return types.void(rows, types.int64, lane), codegen
+
+
+@intrinsic
+def splat(typing_context: Any, value: Any) -> Any:
+    """The same scalar in every lane."""
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        undefined = ir.Constant(_DOUBLES, ir.Undefined)
+        first = builder.insert_element(undefined, args[0], ir.Constant(ir.IntType(32), 0))
+        zeros = ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES)
+        return builder.shuffle_vector(first, undefined, zeros)
+
+    return lane(types.float64), codegen
+
+
+def _llvm(name: str, count: int) -> Any:
+    """An intrinsic that calls an LLVM intrinsic of ``count`` lane vectors."""
+    suffix = f"llvm.{name}.v{LANES}f64"
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        kind = ir.FunctionType(_DOUBLES, [_DOUBLES] * count)
+        return builder.call(cgutils.get_or_insert_function(builder.module, kind, suffix), args)
+
+    return codegen
+
+
+@intrinsic
+def fma(typing_context: Any, a: Any, b: Any, c: Any) -> Any:
+    """a * b + c, rounded once."""
+    return lane(lane, lane, lane), _llvm("fma", 3)
+
+
+@intrinsic
+def sqrt(typing_context: Any, a: Any) -> Any:
+    """Square root, correctly rounded."""
+    return lane(lane), _llvm("sqrt", 1)
+
+
+@intrinsic
+def absolute(typing_context: Any, a: Any) -> Any:
+    """Absolute value."""
+    return lane(lane), _llvm("fabs", 1)
+
+
+@intrinsic
+def select(typing_context: Any, condition: Any, yes: Any, no: Any) -> Any:
+    """``yes`` in the lanes where the condition holds, ``no`` in the others."""
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return builder.select(*args)
+
+    return lane(mask, lane, lane), codegen
+
+
+@intrinsic
+def any_lane(typing_context: Any, condition: Any) -> Any:
+    """True when the condition holds in at least one lane."""
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return builder.icmp_unsigned("!=", builder.bitcast(args[0], _BYTE), _BYTE(0))
+
+    return types.boolean(mask), codegen
+
+
+def _binary(function: Any, instruction: str, operand: types.Type) -> None:
+    @infer_global(function)
+    class _Template(AbstractTemplate):
+        def generic(self, args: Any, kws: Any) -> Any:
+            if args == (operand, operand):
+                return signature(operand, operand, operand)
+            return None
+
+    @lower_builtin(function, operand, operand)
+    def _lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return getattr(builder, instruction)(*args)
+
+
+def _comparison(function: Any, symbol: str) -> None:
+    @infer_global(function)
+    class _Template(AbstractTemplate):
+        def generic(self, args: Any, kws: Any) -> Any:
+            if args == (lane, lane):
+                return signature(mask, lane, lane)
+            return None
+
+    @lower_builtin(function, lane, lane)
+    def _lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        # Ordered comparisons: false where either side is NaN, so a broken world never keeps a loop alive.
+        return builder.fcmp_ordered(symbol, *args)
+
+
+for _function, _instruction in (
+    (operator.add, "fadd"),
+    (operator.sub, "fsub"),
+    (operator.mul, "fmul"),
+    (operator.truediv, "fdiv"),
+):
+    _binary(_function, _instruction, lane)
+_binary(operator.and_, "and_", mask)
+_binary(operator.or_, "or_", mask)
+for _function, _symbol in (
+    (operator.lt, "<"),
+    (operator.le, "<="),
+    (operator.gt, ">"),
+    (operator.ge, ">="),
+):
+    _comparison(_function, _symbol)

@@ -1,0 +1,118 @@
+"""Method: the integrator, the solver and the step that a world uses."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from .integrators.base import Integrator
+from .integrators.closed_form import ClosedForm
+from .integrators.explicit_euler import ExplicitEuler
+from .integrators.rattle import Rattle
+from .integrators.symplectic_euler import SymplecticEuler
+from .scene import checks
+from .scene.contacts import Ground, LinePlatform
+from .scene.links import Cable, CableConstraint
+from .scene.rider import Rider
+from .scene.scene import CONTACTS, FORCES, LINKS, Scene, StiffSpring, members
+from .solvers.base import Solver
+from .solvers.direct import Direct
+from .solvers.gauss_seidel import GaussSeidel
+from .solvers.worst_first import WorstFirst
+
+
+@dataclass(frozen=True)
+class Method:
+    """How a scene is stepped.
+
+    Args:
+        integrator: one of the classes of ``steelyard.integrators``.
+        solver: one of the classes of ``steelyard.solvers``; not needed without links, riders and contacts.
+        dt: step [s], above 0.
+    """
+
+    integrator: Integrator
+    solver: Solver | None = None
+    dt: float = 1.0 / 60.0
+
+    def __post_init__(self) -> None:
+        checks.number("Method", "dt", self.dt, above=0.0, remedy="Use 1/60 for sixty steps a second.")
+        if not isinstance(self.integrator, Integrator):
+            raise TypeError(
+                f"Method: integrator is {self.integrator!r}; it must be an integrator object. Use Rattle()."
+            )
+        if self.solver is not None and not isinstance(self.solver, Solver):
+            raise TypeError(f"Method: solver is {self.solver!r}; it must be a solver object. Use Direct().")
+        for name in ("passes", "iterations"):
+            checks.number(
+                "Method",
+                name,
+                getattr(self.solver, name, 1),
+                least=0 if name == "iterations" else 1,
+                remedy="Give a whole number.",
+            )
+
+    def refuse(self, scene: Scene) -> None:
+        """Raise if this method cannot do what a scene holds.
+
+        Raises:
+            ValueError: names the method, the thing and the remedy.
+        """
+        name = type(self.integrator).__name__
+        held = scene.of(*LINKS, *CONTACTS, Rider)
+        if isinstance(self.integrator, ClosedForm):
+            other = held or scene.of(*FORCES)
+            if other:
+                raise ValueError(
+                    f"ClosedForm cannot step a {type(other[0]).__name__}; the limit is free flight with "
+                    "constant acceleration and damping. Use Rattle()."
+                )
+        elif held and self.solver is None:
+            raise ValueError(
+                f"{name} alone cannot hold a {type(held[0]).__name__}; it needs a solver. "
+                f"Use {self._fitting(self.integrator)}."
+            )
+        elif held and self.solver is not None and self.solver.staged not in self.integrator.solver_stages:
+            raise ValueError(
+                f"{name} does not work with {type(self.solver).__name__}. "
+                f"Use {self._fitting(self.integrator)} with it."
+            )
+        if isinstance(self.solver, WorstFirst) and scene.of(Rider):
+            raise ValueError(
+                "WorstFirst cannot hold a Rider: it has no impulse for it. Use Direct(), or spread the load's mass "
+                "over the deck (steelyard.scenes.lumped_masses)."
+            )
+        sprung = {id(spring.particle) for spring in scene.of(StiffSpring)}
+        for thing in held:
+            if isinstance(thing, Ground | LinePlatform) and thing.particles is None:
+                touched = [p for p in scene.particles if p.movable]
+            else:
+                touched = list(members(thing))
+            if any(id(p) in sprung for p in touched):
+                raise ValueError(
+                    f"{name}: a particle on a StiffSpring also takes part in a {type(thing).__name__}; the "
+                    "spring's solution is exact only alone. Use AnchoredSpring, or name the other "
+                    "particles."
+                )
+        if isinstance(self.integrator, ExplicitEuler) and any(
+            isinstance(x, Cable | CableConstraint) and x.winch for x in scene.of(*LINKS)
+        ):
+            raise ValueError("ExplicitEuler cannot drive a winch. Use SymplecticEuler() or Rattle().")
+
+    @staticmethod
+    def _fitting(integrator: Integrator) -> str:
+        return "WorstFirst()" if True not in integrator.solver_stages else "Direct() or GaussSeidel()"
+
+
+DEFAULT = Method(Rattle(), Direct())
+
+__all__ = [
+    "DEFAULT",
+    "ClosedForm",
+    "Direct",
+    "ExplicitEuler",
+    "GaussSeidel",
+    "Method",
+    "Rattle",
+    "SymplecticEuler",
+    "WorstFirst",
+]

@@ -1,0 +1,359 @@
+"""The direct solver's sparse matrix, settled when a scene is compiled: blocks, order, fill and index tapes."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from . import sparsity
+from .tape import CONTACT, LINK
+
+if TYPE_CHECKING:
+    from .compile import Compiler
+
+_DIAGONAL = (0, 2, 5)
+
+# A movable particle of a block row: index, row of its coefficient, row of its inverse mass.
+Node = tuple[int, int, int]
+
+
+def _lower(row: int, column: int) -> int:
+    """Place of an entry of a symmetric block among its six rows."""
+    return row * (row + 1) // 2 + column
+
+
+class Network:
+    """Blocks of a scene's constraints and the tapes that assemble, factorise and solve them."""
+
+    def __init__(self, compiler: Compiler) -> None:
+        self.c = compiler
+        self.link_blocks: list[list[int]] = []
+        self.masks: dict[int, int] = {}
+
+    def build(self) -> None:
+        """Fill the compiler's sections of the direct solver."""
+        self._blocks()
+        self._rows()
+        self._assembly()
+        self._masks()
+        self._elimination()
+        self._contact_system()
+        self.c.model.blocks = self.count
+
+    # Blocks and rows
+
+    def _ends(self, link: int) -> list[tuple[int, int, int]]:
+        """Movable ends of a link: (particle, inverse mass row, sign of d there)."""
+        thing = self.c.links[link]
+        first = getattr(thing, "a", None) or thing.particle
+        ends = [(first, 1), (getattr(thing, "b", None), -1)]
+        return [
+            (self.c.of(p), self.c.header["inverse_mass"] + self.c.of(p), sign)
+            for p, sign in ends
+            if p is not None and p.movable
+        ]
+
+    def _kept(self) -> list[int]:
+        """Links with a row of their own: cables, and rods that others do not imply."""
+        c = self.c
+        count = len(c.particles)
+        points = [p.position for p in c.particles]
+        masses = [p.inverse_mass for p in c.particles]
+        rods: list[int] = []
+        pairs: list[tuple[int, int]] = []
+        kept: list[int] = []
+        for index, link in enumerate(c.links):
+            if c.is_cable(link):
+                kept.append(index)
+            elif self._ends(index):
+                other = getattr(link, "b", None)
+                if other is None:
+                    points.append(link.anchor)
+                    masses.append(0.0)
+                    pair = (c.of(link.particle), len(points) - 1)
+                else:
+                    pair = (c.of(link.a), c.of(other))
+                rods.append(index)
+                pairs.append(pair)
+        independent = sparsity.independent_rods(np.array(points), pairs, np.array(masses))
+        kept += [rods[k] for k in independent]
+        c.model.dropped = [c.links[rod] for k, rod in enumerate(rods) if k not in set(independent)]
+        assert len(points) >= count
+        return sorted(kept)
+
+    def _blocks(self) -> None:
+        """Group links, number blocks and settle the elimination order; contacts come last."""
+        c = self.c
+        kept = self._kept()
+        ends = [frozenset(p for p, _, _ in self._ends(link)) for link in kept]
+        self.link_blocks = [[kept[k] for k in block] for block in sparsity.group(ends)]
+        nodes = [
+            frozenset(p for link in block for p, _, _ in self._ends(link)) for block in self.link_blocks
+        ]
+        self.points: dict[int, list[Node]] = {}
+        self.frames: dict[int, int] = {}
+        identity = c.slot(9, (), lambda: np.eye(3).ravel()) if c.riders else -1
+        at = 0
+        records = c.sections["riders"]
+        for rider in c.riders:
+            block = len(nodes)
+            deck = [p for p in rider.deck]
+            held = records[at + 9]
+            self.points[block] = self._nodes(
+                [(rider.particle, c.one)] + [(p, held + k) for k, p in enumerate(deck)]
+            )
+            self.frames[block] = identity
+            records[at + 4] = 3 * block
+            nodes.append(frozenset(p for p, _, _ in self.points[block]))
+            at += 10 + 4 * len(deck)
+        self.structural = len(nodes)
+        for k, (_, a, b, _) in enumerate(c.contacts):
+            block = len(nodes)
+            pairs = [(a, c.one)] + ([(b, c.minus_one)] if b is not None else [])
+            self.points[block] = self._nodes(pairs)
+            record = c.sections["contacts"]
+            self.frames[block] = record[CONTACT * k + 16]
+            record[CONTACT * k + 19] = 3 * block
+            record[CONTACT * k + 20] = block
+            nodes.append(frozenset(p for p, _, _ in self.points[block]))
+        self.count = len(nodes)
+        adjacency = sparsity.neighbours(nodes)
+        links = len(self.link_blocks)
+        self.order = (
+            sparsity.minimum_degree(adjacency, 0, links)
+            + sparsity.minimum_degree(adjacency, links, self.structural)
+            + sparsity.minimum_degree(adjacency, self.structural, self.count)
+        )
+        self.pattern = sparsity.fill(adjacency, self.order)
+        for block, members in enumerate(self.link_blocks):
+            for row, link in enumerate(members):
+                c.sections["links"][LINK * link + 15] = 3 * block + row
+
+    def _nodes(self, pairs: list) -> list[Node]:
+        c = self.c
+        return [
+            (c.of(p), coefficient, c.header["inverse_mass"] + c.of(p))
+            for p, coefficient in pairs
+            if p.movable
+        ]
+
+    def _rows(self) -> None:
+        """Scratch rows of the matrix, its factor and the solution."""
+        c = self.c
+        pairs = [
+            (row, column) for row in range(self.count) for column in self.pattern[row]
+        ]
+        size = 6 * self.count + 9 * len(pairs)
+        matrix = c.take(size)
+        c.header["matrix"] = matrix
+        c.header["matrix_rows"] = size
+        self.diagonal = {position: matrix + 6 * position for position in range(self.count)}
+        base = matrix + 6 * self.count
+        self.a = {pair: base + 9 * k for k, pair in enumerate(pairs)}
+        self.inverse = {position: c.take(6) for position in range(self.structural)}
+        self.p = {pair: c.take(9) for pair in pairs if pair[1] < self.structural}
+        self.reference = {position: c.take(3) for position in range(self.count)}
+        for name in ("right", "guess", "mask", "used_mask"):
+            c.header[name] = c.take(3 * self.count)
+        self.place = {block: position for position, block in enumerate(self.order)}
+
+    # Assembly
+
+    def _assembly(self) -> None:
+        c = self.c
+        diagonals: list[int] = []
+        couplings: list[int] = []
+        touching: dict[int, list[tuple[int, int, int]]] = {}
+        for block, members in enumerate(self.link_blocks):
+            for row, link in enumerate(members):
+                record = c.sections["links"][LINK * link : LINK * link + LINK]
+                target = self.diagonal[self.place[block]] + _DIAGONAL[row]
+                diagonals += [target, record[13], record[6], record[7]]
+                for p, _, sign in self._ends(link):
+                    touching.setdefault(p, []).append((3 * block + row, record[13], sign))
+        for p, around in touching.items():
+            mass = c.header["inverse_mass"] + p
+            for k, (slot, d, sign) in enumerate(around):
+                for other, e, opposite in around[:k]:
+                    target, _ = self._entry(slot, other)
+                    one = c.one if sign == opposite else c.minus_one
+                    couplings += [target, d, e, mass, one]
+        point_diagonals: list[int] = []
+        point_links: list[int] = []
+        point_points: list[int] = []
+        for block, nodes in self.points.items():
+            row = self.place[block]
+            for p, coefficient, mass in nodes:
+                point_diagonals += [self.diagonal[row], coefficient, mass]
+                for slot, d, sign in touching.get(p, []):
+                    target = self.a[row, self.place[slot // 3]] + slot % 3
+                    one = c.minus_one if sign > 0 else c.one
+                    point_links += [target, self.frames[block], coefficient, mass, one, d]
+                for other, others in self.points.items():
+                    column = self.place[other]
+                    if column < row:
+                        for q, coefficient_q, _ in others:
+                            if q == p:
+                                target = self.a[row, column]
+                                frames = [self.frames[block], self.frames[other]]
+                                point_points += [target, *frames, coefficient, coefficient_q, mass]
+        c.sections["link_diagonals"] = diagonals
+        c.sections["link_couplings"] = couplings
+        c.sections["point_diagonals"] = point_diagonals
+        c.sections["point_links"] = point_links
+        c.sections["point_points"] = point_points
+        c.widths |= {
+            "link_diagonals": 4, "link_couplings": 5, "point_diagonals": 3, "point_links": 6,
+            "point_points": 6, "link_masks": 3, "padding": 2, "references": 2, "contact_copies": 5,
+        }  # fmt: skip
+
+    def _entry(self, slot: int, other: int) -> tuple[int, bool]:
+        """Matrix row of the entry of two link rows, and whether it lies on a diagonal block."""
+        i, j = self.place[slot // 3], self.place[other // 3]
+        r, s = slot % 3, other % 3
+        if i == j:
+            return self.diagonal[i] + _lower(max(r, s), min(r, s)), True
+        if i < j:
+            i, j, r, s = j, i, s, r
+        return self.a[i, j] + 3 * r + s, False
+
+    def _masks(self) -> None:
+        """Entries to clear for slack cables, and the ones on the diagonal of rows out of use."""
+        c = self.c
+        mask = c.header["mask"]
+        cables = {
+            3 * block + row
+            for block, members in enumerate(self.link_blocks)
+            for row, link in enumerate(members)
+            if c.is_cable(c.links[link])
+        }
+        masks: list[int] = []
+        padding: list[int] = []
+        references: list[int] = []
+        for position, block in enumerate(self.order):
+            diagonal = self.diagonal[position]
+            size = len(self.link_blocks[block]) if block < len(self.link_blocks) else 3
+            for row in range(3):
+                slot = 3 * block + row
+                references += [self.reference[position] + row, diagonal + _DIAGONAL[row]]
+                if row >= size:
+                    padding += [diagonal + _DIAGONAL[row], c.zero]
+                elif slot in cables:
+                    padding += [diagonal + _DIAGONAL[row], mask + slot]
+                for column in range(row):
+                    if {slot, 3 * block + column} & cables:
+                        masks += [diagonal + _lower(row, column), mask + slot, mask + 3 * block + column]
+            for column_position in self.pattern[position]:
+                other = self.order[column_position]
+                entry = self.a[position, column_position]
+                for row in range(3):
+                    for column in range(3):
+                        slots = (3 * block + row, 3 * other + column)
+                        if set(slots) & cables:
+                            rows = [mask + slot if slot in cables else c.one for slot in slots]
+                            masks += [entry + 3 * row + column, *rows]
+        c.sections["link_masks"] = masks
+        c.sections["padding"] = padding
+        c.sections["references"] = references
+
+    # Elimination
+
+    def _elimination(self) -> None:
+        c = self.c
+        right = c.header["right"]
+        factor: list[int] = []
+        forward: list[int] = []
+        backward: list[int] = []
+        for i, block in enumerate(self.order):
+            contact = i >= self.structural
+            columns = self.pattern[i]
+            factor += [self.diagonal[i], -1 if contact else self.inverse[i], self.reference[i], block]
+            factor.append(len(columns))
+            for j in columns:
+                shared = [
+                    k for k in self.pattern[j] if k in set(columns) and k < self.structural
+                ]
+                outer = j >= self.structural
+                factor += [
+                    self.a[i, j],
+                    -1 if outer else self.p[i, j],
+                    -1 if outer else self.inverse[j],
+                    self.order[j],
+                    len(shared),
+                ]
+                for k in shared:
+                    factor += [self.a[i, k], self.p[j, k], self.order[k]]
+            inner = [j for j in columns if j < self.structural]
+            forward += [right + 3 * block, block, len(inner)]
+            for j in inner:
+                forward += [self.p[i, j], right + 3 * self.order[j], self.order[j]]
+        for i in reversed(range(self.structural)):
+            later = [k for k in range(i + 1, self.count) if i in self.pattern[k]]
+            block = self.order[i]
+            backward += [right + 3 * block, self.inverse[i], block, len(later)]
+            for k in later:
+                backward += [self.p[k, i], right + 3 * self.order[k], self.order[k]]
+        c.sections |= {"factor": factor, "forward": forward, "backward": backward}
+        c.counts |= {"factor": self.count, "forward": self.count, "backward": self.structural}
+
+    def _contact_system(self) -> None:
+        """Copy of W for the solve in which loaded contacts stick, and W's rows by contact."""
+        c = self.c
+        first = self.structural
+        guess, mask = c.header["guess"], c.header["mask"]
+        outer = range(first, self.count)
+        diagonal = {i: c.take(6) for i in outer}
+        inverse = {i: c.take(6) for i in outer}
+        pairs = [(i, j) for i in outer for j in self.pattern[i] if j >= first]
+        v = {pair: c.take(9) for pair in pairs}
+        p = {pair: c.take(9) for pair in pairs}
+        copies: list[int] = []
+        factor: list[int] = []
+        forward: list[int] = []
+        backward: list[int] = []
+        for i in outer:
+            slot = mask + 3 * self.order[i]
+            for row in range(3):
+                for column in range(row + 1):
+                    entry = _lower(row, column)
+                    reference = self.reference[i] + row if row == column else -1
+                    copies += [diagonal[i] + entry, self.diagonal[i] + entry, slot + row, slot + column]
+                    copies.append(reference)
+            columns = [j for j in self.pattern[i] if j >= first]
+            factor += [diagonal[i], inverse[i], self.reference[i], self.order[i], len(columns)]
+            forward += [guess + 3 * self.order[i], self.order[i], len(columns)]
+            for j in columns:
+                other = mask + 3 * self.order[j]
+                for row in range(3):
+                    for column in range(3):
+                        entry = 3 * row + column
+                        rows = [slot + row, other + column]
+                        copies += [v[i, j] + entry, self.a[i, j] + entry, *rows, -1]
+                shared = [k for k in self.pattern[j] if k >= first and k in set(columns)]
+                factor += [v[i, j], p[i, j], inverse[j], self.order[j], len(shared)]
+                for k in shared:
+                    factor += [v[i, k], p[j, k], self.order[k]]
+                forward += [p[i, j], guess + 3 * self.order[j], self.order[j]]
+        for i in reversed(outer):
+            later = [k for k in range(i + 1, self.count) if i in self.pattern[k]]
+            backward += [guess + 3 * self.order[i], inverse[i], self.order[i], len(later)]
+            for k in later:
+                backward += [p[k, i], guess + 3 * self.order[k], self.order[k]]
+        products: list[int] = []
+        for block in range(first, self.count):
+            i = self.place[block]
+            others = [(self.a[i, j], j, 0) for j in self.pattern[i] if j >= first]
+            others += [(self.a[k, i], k, 1) for k in range(i + 1, self.count) if i in self.pattern[k]]
+            products += [3 * block, self.diagonal[i], block, len(others)]
+            for rows, k, transposed in others:
+                products += [rows, 3 * self.order[k], transposed, self.order[k]]
+        size = self.count - first
+        c.sections |= {
+            "contact_copies": copies, "contact_factor": factor, "contact_forward": forward,
+            "contact_backward": backward, "contact_products": products,
+        }  # fmt: skip
+        c.counts |= {
+            "contact_factor": size, "contact_forward": size, "contact_backward": size,
+            "contact_products": size,
+        }  # fmt: skip

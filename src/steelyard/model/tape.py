@@ -1,0 +1,79 @@
+"""The index tape: integers that tell fixed kernels what one scene holds.
+
+``tape[H_...]`` are the header fields below: counts, first rows of arrays in the scratch, and places on the
+tape where sections start. A section starts with its count, then one record of fixed width per entry. All
+indices are rows of the scratch of shape (rows, LANES), so a kernel fetches a particle's position, an anchor
+or a parameter in the same way. A count of zero is a loop of no trips.
+"""
+
+from __future__ import annotations
+
+(
+    H_PARTICLES,
+    H_STATE_ROWS,
+    H_POSITION,
+    H_VELOCITY,
+    H_INVERSE_MASS,
+    H_ACCELERATION,
+    H_DAMPING,
+    H_DAMPED,
+    H_FORCE,
+    H_FORCED,
+    H_START,
+    H_FREE,
+    H_IMPULSE,
+    H_UNSETTLED,
+    H_NONFINITE,
+    H_TIME,
+    H_DT,
+    H_INTEGRATOR,
+    H_SOLVER,
+    H_PASSES,
+    H_TOLERANCE,
+    H_CONSTRAINED,
+    H_CABLES,
+    H_DRIFT,
+    H_STIFF_SPRINGS,
+    H_SPRINGS,
+    H_GRAVITIES,
+    H_BUOYANCIES,
+    H_DRAGS,
+    H_USER_FORCES,
+    H_WINCHES,
+    H_LINKS,
+    H_RIDERS,
+    H_CONTACTS,
+    H_GENERATORS,
+    H_MATRIX,
+    H_MATRIX_ROWS,
+    H_LINK_DIAGONALS,
+    H_LINK_COUPLINGS,
+    H_POINT_DIAGONALS,
+    H_POINT_LINKS,
+    H_POINT_POINTS,
+    H_REFERENCES,
+    H_LINK_MASKS,
+    H_PADDING,
+    H_FACTOR,
+    H_FORWARD,
+    H_BACKWARD,
+    H_CONTACT_COPIES,
+    H_CONTACT_FACTOR,
+    H_CONTACT_FORWARD,
+    H_CONTACT_BACKWARD,
+    H_CONTACT_PRODUCTS,
+    H_RIGHT,
+    H_GUESS,
+    H_MASK,
+    H_USED_MASK,
+) = range(57)
+HEADER = 57
+
+# Width of the records of links and contacts; ``model.compile`` writes them field by field.
+LINK = 16
+CONTACT = 24
+
+# Codes of integrators, solvers and contact geometries.
+EXPLICIT_EULER, SYMPLECTIC_EULER, RATTLE, CLOSED_FORM = range(4)
+NO_SOLVER, WORST_FIRST, GAUSS_SEIDEL, DIRECT = range(4)
+GROUND, LINE, USER = range(3)

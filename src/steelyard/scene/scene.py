@@ -1,0 +1,133 @@
+"""Scene: what a person writes, before any method or number of worlds is chosen."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, TypeVar
+
+from . import checks
+from .contacts import ContactGenerator, Ground, LinePlatform
+from .forces import (
+    AnchoredBungee,
+    AnchoredSpring,
+    Bungee,
+    Buoyancy,
+    Drag,
+    Gravity,
+    Spring,
+    StiffSpring,
+    UserForce,
+)
+from .links import Cable, CableConstraint, Rod, RodConstraint
+from .particle import Particle
+from .rider import Rider
+
+LINKS = (Rod, RodConstraint, Cable, CableConstraint)
+CONTACTS = (Ground, LinePlatform, ContactGenerator)
+FORCES = (
+    Gravity,
+    Drag,
+    Spring,
+    Bungee,
+    AnchoredSpring,
+    AnchoredBungee,
+    StiffSpring,
+    Buoyancy,
+    UserForce,
+)
+KINDS = (Particle, Rider, *LINKS, *CONTACTS, *FORCES)
+
+Thing = TypeVar("Thing")
+
+
+def members(thing: Any) -> Iterator[Particle]:
+    """The particles that a link, rider, contact generator or force refers to."""
+    for name in ("a", "b", "particle"):
+        value = getattr(thing, name, None)
+        if value is not None:
+            yield value
+    yield from getattr(thing, "particles", None) or ()
+    yield from getattr(thing, "deck", ())
+    for pair in getattr(thing, "pairs", ()):
+        yield from (particle for particle in pair if particle is not None)
+
+
+class Scene:
+    """Particles and everything that acts on them, in the order in which they were added.
+
+    Args:
+        gravity: acceleration [m/s^2] of every particle that does not bring its own.
+    """
+
+    def __init__(self, *, gravity: checks.Vector = (0.0, -9.81, 0.0)) -> None:
+        self.gravity = checks.vector("Scene", "gravity", gravity)
+        self.things: list[Any] = []
+
+    def add(self, thing: Thing) -> Thing:
+        """Add a particle, link, rider, contact generator or force, and return it.
+
+        Raises:
+            TypeError: not something that a scene holds.
+            ValueError: already in this scene, or it refers to a particle that is not.
+        """
+        name = type(thing).__name__
+        if not isinstance(thing, KINDS):
+            raise TypeError(
+                f"Scene.add: {thing!r} is a {name}; a scene holds "
+                f"{', '.join(kind.__name__ for kind in KINDS)}. Build one of these."
+            )
+        if thing in self:
+            raise ValueError(f"Scene.add: this {name} is already in the scene; add another one.")
+        for particle in members(thing):
+            if particle not in self:
+                raise ValueError(
+                    f"Scene.add: this {name} refers to a particle at {particle.position} that is not in "
+                    "this scene; both must belong to the same scene. Add the particle first."
+                )
+        if isinstance(thing, StiffSpring) and any(
+            force.particle is thing.particle for force in self.of(StiffSpring)
+        ):
+            raise ValueError(
+                f"Scene.add: the particle at {thing.particle.position} has a StiffSpring already; the "
+                "limit is 1 per particle, since its solution is exact only alone. Use AnchoredSpring."
+            )
+        self.things.append(thing)
+        return thing
+
+    def remove(self, thing: Any) -> None:
+        """Take a thing out.
+
+        Raises:
+            ValueError: it is not in the scene, or something left in the scene refers to it.
+        """
+        if thing not in self:
+            raise ValueError(f"Scene.remove: this {type(thing).__name__} is not in the scene.")
+        for other in self.things:
+            if other is not thing and any(particle is thing for particle in members(other)):
+                raise ValueError(
+                    f"Scene.remove: a {type(other).__name__} still refers to this particle; remove that first."
+                )
+        self.things = [other for other in self.things if other is not thing]
+
+    def of(self, *kinds: type[Thing]) -> list[Thing]:
+        """The things of exactly these kinds, in the order they were added."""
+        return [thing for thing in self.things if type(thing) in kinds]
+
+    def copy(self) -> Scene:
+        """A scene with the same things; adding to one leaves the other."""
+        other = Scene(gravity=self.gravity)
+        other.things = list(self.things)
+        return other
+
+    @property
+    def particles(self) -> list[Particle]:
+        """All particles, in the order they were added: the order of every particle axis."""
+        return self.of(Particle)
+
+    def __contains__(self, thing: object) -> bool:
+        return any(other is thing for other in self.things)
+
+    def __repr__(self) -> str:
+        counts = {kind.__name__: len(self.of(kind)) for kind in KINDS}
+        parts = ", ".join(f"{count} {name}" for name, count in counts.items() if count)
+        return f"Scene({parts or 'empty'}, gravity={self.gravity})"

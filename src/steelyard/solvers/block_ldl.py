@@ -1,0 +1,219 @@
+"""Sparse block LDL^T over an index tape: the same few operations for every scene.
+
+Tape of one factorisation, block rows in elimination order::
+
+    count, then per block row I:
+        diagonal, inverse, reference, block, count of J, then per J < I:
+            A_IJ, P_IJ, inverse_J, J, count of K, then per K < J in both patterns:
+                A_IK, P_JK, K
+
+A holds the matrix and, after elimination, U = L D; P = L. ``diagonal`` are six rows (00 10 11 20 21 22),
+off-diagonal blocks nine, row by row. Blocks whose flag in ``skip`` is set do not take part.
+
+Source: Golub & Van Loan, *Matrix Computations*, 4.1; pivots below 1e-10 of the matrix's own diagonal mark a
+row that depends on earlier ones: its inverse is set to 0, which leaves that row out.
+"""
+
+from __future__ import annotations
+
+from ..kernel import kernel
+from ..math.lanes import fma, load, select, splat, store
+
+_PIVOT = 1e-10
+
+
+@kernel
+def _inverse_pivot(pivot, reference):
+    zero = splat(0.0)
+    return select(pivot > splat(_PIVOT) * reference, splat(1.0) / pivot, zero)
+
+
+@kernel
+def _invert(s, a, out, reference):
+    """Inverse of a symmetric 3 x 3 block by LDL^T, dependent rows left out."""
+    zero = splat(0.0)
+    a10 = load(s, a + 1)
+    a20 = load(s, a + 3)
+    i0 = _inverse_pivot(load(s, a), load(s, reference))
+    l10 = a10 * i0
+    l20 = a20 * i0
+    i1 = _inverse_pivot(fma(zero - l10, a10, load(s, a + 2)), load(s, reference + 1))
+    t21 = fma(zero - l20, a10, load(s, a + 4))
+    l21 = t21 * i1
+    last = fma(zero - l21, t21, fma(zero - l20, a20, load(s, a + 5)))
+    i2 = _inverse_pivot(last, load(s, reference + 2))
+    m10 = zero - l10
+    m21 = zero - l21
+    m20 = fma(l21, l10, zero - l20)
+    store(s, out, fma(m20 * m20, i2, fma(m10 * m10, i1, i0)))
+    store(s, out + 1, fma(m20 * m21, i2, m10 * i1))
+    store(s, out + 2, fma(m21 * m21, i2, i1))
+    store(s, out + 3, m20 * i2)
+    store(s, out + 4, m21 * i2)
+    store(s, out + 5, i2)
+
+
+@kernel
+def _subtract_product(s, target, left, right):
+    """target -= left right^T for 3 x 3 blocks stored row by row."""
+    zero = splat(0.0)
+    b00 = load(s, right)
+    b01 = load(s, right + 1)
+    b02 = load(s, right + 2)
+    b10 = load(s, right + 3)
+    b11 = load(s, right + 4)
+    b12 = load(s, right + 5)
+    b20 = load(s, right + 6)
+    b21 = load(s, right + 7)
+    b22 = load(s, right + 8)
+    for row in range(3):
+        at = 3 * row
+        x = zero - load(s, left + at)
+        y = zero - load(s, left + at + 1)
+        z = zero - load(s, left + at + 2)
+        store(s, target + at, fma(z, b02, fma(y, b01, fma(x, b00, load(s, target + at)))))
+        store(s, target + at + 1, fma(z, b12, fma(y, b11, fma(x, b10, load(s, target + at + 1)))))
+        store(s, target + at + 2, fma(z, b22, fma(y, b21, fma(x, b20, load(s, target + at + 2)))))
+
+
+@kernel
+def _subtract_square(s, target, left, right):
+    """Lower half of target -= left right^T, where the product is symmetric."""
+    zero = splat(0.0)
+    entry = 0
+    for row in range(3):
+        x = zero - load(s, left + 3 * row)
+        y = zero - load(s, left + 3 * row + 1)
+        z = zero - load(s, left + 3 * row + 2)
+        for column in range(row + 1):
+            b = right + 3 * column
+            value = fma(x, load(s, b), load(s, target + entry))
+            value = fma(y, load(s, b + 1), value)
+            store(s, target + entry, fma(z, load(s, b + 2), value))
+            entry += 1
+
+
+@kernel
+def _scale(s, a, inverse, out):
+    """out = a inverse, ``inverse`` symmetric in six rows."""
+    d00 = load(s, inverse)
+    d10 = load(s, inverse + 1)
+    d11 = load(s, inverse + 2)
+    d20 = load(s, inverse + 3)
+    d21 = load(s, inverse + 4)
+    d22 = load(s, inverse + 5)
+    for row in range(3):
+        x = load(s, a + 3 * row)
+        y = load(s, a + 3 * row + 1)
+        z = load(s, a + 3 * row + 2)
+        store(s, out + 3 * row, fma(z, d20, fma(y, d10, x * d00)))
+        store(s, out + 3 * row + 1, fma(z, d21, fma(y, d11, x * d10)))
+        store(s, out + 3 * row + 2, fma(z, d22, fma(y, d21, x * d20)))
+
+
+@kernel
+def factor(tape, at, s, skip):
+    """Factorise in place; ``tape[at]`` starts the tape above. ``skip`` (blocks,) flags blocks left out."""
+    rows = tape[at]
+    at += 1
+    for _ in range(rows):
+        diagonal = tape[at]
+        inverse = tape[at + 1]
+        reference = tape[at + 2]
+        here = skip[tape[at + 3]] == 0
+        columns = tape[at + 4]
+        at += 5
+        for _ in range(columns):
+            a = tape[at]
+            p = tape[at + 1]
+            column_inverse = tape[at + 2]
+            there = here and skip[tape[at + 3]] == 0
+            products = tape[at + 4]
+            at += 5
+            if there:
+                for product in range(products):
+                    k = at + 3 * product
+                    if skip[tape[k + 2]] == 0:
+                        _subtract_product(s, a, tape[k], tape[k + 1])
+                if column_inverse >= 0:
+                    _scale(s, a, column_inverse, p)
+                    _subtract_square(s, diagonal, a, p)
+            at += 3 * products
+        if here and inverse >= 0:
+            _invert(s, diagonal, inverse, reference)
+
+
+@kernel
+def forward(tape, at, s, skip):
+    """y_I = r_I - sum of P_IJ y_J, in place.
+
+    Tape: count, then per block row: y, block, count, then per J: P_IJ, y_J, J.
+    """
+    zero = splat(0.0)
+    rows = tape[at]
+    at += 1
+    for _ in range(rows):
+        y = tape[at]
+        here = skip[tape[at + 1]] == 0
+        columns = tape[at + 2]
+        at += 3
+        if here:
+            y0 = load(s, y)
+            y1 = load(s, y + 1)
+            y2 = load(s, y + 2)
+            for column in range(columns):
+                p = tape[at + 3 * column]
+                x = tape[at + 3 * column + 1]
+                if skip[tape[at + 3 * column + 2]] == 0:
+                    x0 = zero - load(s, x)
+                    x1 = zero - load(s, x + 1)
+                    x2 = zero - load(s, x + 2)
+                    y0 = fma(load(s, p + 2), x2, fma(load(s, p + 1), x1, fma(load(s, p), x0, y0)))
+                    y1 = fma(load(s, p + 5), x2, fma(load(s, p + 4), x1, fma(load(s, p + 3), x0, y1)))
+                    y2 = fma(load(s, p + 8), x2, fma(load(s, p + 7), x1, fma(load(s, p + 6), x0, y2)))
+            store(s, y, y0)
+            store(s, y + 1, y1)
+            store(s, y + 2, y2)
+        at += 3 * columns
+
+
+@kernel
+def backward(tape, at, s, skip):
+    """z_I = D_I^-1 y_I - sum over later K of P_KI^T z_K, in place.
+
+    Tape: count, then per block row, last first: y, inverse, block, count, then per
+    K: P_KI, z_K, K.
+    """
+    zero = splat(0.0)
+    rows = tape[at]
+    at += 1
+    for _ in range(rows):
+        y = tape[at]
+        inverse = tape[at + 1]
+        here = skip[tape[at + 2]] == 0
+        columns = tape[at + 3]
+        at += 4
+        if here:
+            y0 = load(s, y)
+            y1 = load(s, y + 1)
+            y2 = load(s, y + 2)
+            d10 = load(s, inverse + 1)
+            d20 = load(s, inverse + 3)
+            d21 = load(s, inverse + 4)
+            z0 = fma(d20, y2, fma(d10, y1, load(s, inverse) * y0))
+            z1 = fma(d21, y2, fma(load(s, inverse + 2), y1, d10 * y0))
+            z2 = fma(load(s, inverse + 5), y2, fma(d21, y1, d20 * y0))
+            for column in range(columns):
+                p = tape[at + 3 * column]
+                x = tape[at + 3 * column + 1]
+                if skip[tape[at + 3 * column + 2]] == 0:
+                    x0 = zero - load(s, x)
+                    x1 = zero - load(s, x + 1)
+                    x2 = zero - load(s, x + 2)
+                    z0 = fma(load(s, p + 6), x2, fma(load(s, p + 3), x1, fma(load(s, p), x0, z0)))
+                    z1 = fma(load(s, p + 7), x2, fma(load(s, p + 4), x1, fma(load(s, p + 1), x0, z1)))
+                    z2 = fma(load(s, p + 8), x2, fma(load(s, p + 5), x1, fma(load(s, p + 2), x0, z2)))
+            store(s, y, z0)
+            store(s, y + 1, z1)
+            store(s, y + 2, z2)
+        at += 3 * columns

@@ -1,0 +1,225 @@
+"""Contacts of the direct solver on their Schur complement W: who opens, sticks or slides.
+
+Find multipliers l with u = W l - b, per contact: l_n >= 0, u_n >= 0, l_n u_n = 0, |l_t| <= mu l_n, and l_t opposite to
+u_t where it slides (Signorini and Coulomb). First try: loaded contacts stick, one solve. Worlds where that
+breaks a condition are swept: projected Gauss-Seidel on W, whose fixed point is the law itself.
+"""
+
+from __future__ import annotations
+
+from ..kernel import kernel
+from ..math.lanes import absolute, any_lane, fma, load, select, splat, sqrt, store
+from ..model.tape import (
+    CONTACT,
+    H_CONTACT_BACKWARD,
+    H_CONTACT_COPIES,
+    H_CONTACT_FACTOR,
+    H_CONTACT_FORWARD,
+    H_CONTACT_PRODUCTS,
+    H_CONTACTS,
+    H_GUESS,
+    H_MASK,
+    H_RIGHT,
+)
+from . import block_ldl
+
+_SWEEPS = 400
+
+
+@kernel
+def _relative(tape, s, skip, k, source):
+    """(W l)_c for the contact whose product record starts at ``k``: three lane vectors.
+
+    Record: slot, diagonal six rows, block, count, then per other contact: nine rows, its slot, whether
+    transposed, its block. ``source`` is the first row of l by slot.
+    """
+    slot = source + tape[k]
+    w = tape[k + 1]
+    n = load(s, slot)
+    t = load(s, slot + 1)
+    u = load(s, slot + 2)
+    a = fma(load(s, w + 3), u, fma(load(s, w + 1), t, load(s, w) * n))
+    b = fma(load(s, w + 4), u, fma(load(s, w + 2), t, load(s, w + 1) * n))
+    c = fma(load(s, w + 5), u, fma(load(s, w + 4), t, load(s, w + 3) * n))
+    for other in range(tape[k + 3]):
+        o = k + 4 + 4 * other
+        if skip[tape[o + 3]] == 0:
+            m = tape[o]
+            x = source + tape[o + 1]
+            n = load(s, x)
+            t = load(s, x + 1)
+            u = load(s, x + 2)
+            if tape[o + 2] == 0:
+                a = fma(load(s, m + 2), u, fma(load(s, m + 1), t, fma(load(s, m), n, a)))
+                b = fma(load(s, m + 5), u, fma(load(s, m + 4), t, fma(load(s, m + 3), n, b)))
+                c = fma(load(s, m + 8), u, fma(load(s, m + 7), t, fma(load(s, m + 6), n, c)))
+            else:
+                a = fma(load(s, m + 6), u, fma(load(s, m + 3), t, fma(load(s, m), n, a)))
+                b = fma(load(s, m + 7), u, fma(load(s, m + 4), t, fma(load(s, m + 1), n, b)))
+                c = fma(load(s, m + 8), u, fma(load(s, m + 5), t, fma(load(s, m + 2), n, c)))
+    return a, b, c
+
+
+@kernel
+def _stick(tape, s, skip):
+    """Solve W l = b over the masked rows into the guess rows."""
+    at = tape[H_CONTACT_COPIES]
+    for index in range(tape[at]):
+        k = at + 1 + 5 * index
+        taken = load(s, tape[k + 2]) * load(s, tape[k + 3])
+        value = load(s, tape[k + 1]) * taken
+        if tape[k + 4] >= 0:
+            value = fma(load(s, tape[k + 4]), splat(1.0) - taken, value)
+        store(s, tape[k], value)
+    at = tape[H_CONTACTS]
+    for index in range(tape[at]):
+        contact = at + 1 + CONTACT * index
+        if skip[tape[contact + 20]] == 0:
+            slot = tape[contact + 19]
+            for axis in range(3):
+                row = slot + axis
+                value = load(s, tape[H_RIGHT] + row) * load(s, tape[H_MASK] + row)
+                store(s, tape[H_GUESS] + row, value)
+    block_ldl.factor(tape, tape[H_CONTACT_FACTOR], s, skip)
+    block_ldl.forward(tape, tape[H_CONTACT_FORWARD], s, skip)
+    block_ldl.backward(tape, tape[H_CONTACT_BACKWARD], s, skip)
+
+
+@kernel
+def _violated(tape, s, skip, velocity):
+    """Worlds in which the guess breaks a condition."""
+    zero = splat(0.0)
+    half = splat(0.5)
+    bad = zero > zero
+    at = tape[H_CONTACTS]
+    k = tape[H_CONTACT_PRODUCTS] + 1
+    for index in range(tape[at]):
+        contact = at + 1 + CONTACT * index
+        if skip[tape[contact + 20]] == 0:
+            slot = tape[contact + 19]
+            loaded = load(s, tape[H_MASK] + slot) > half
+            guess = tape[H_GUESS] + slot
+            n = load(s, guess)
+            a, _, _ = _relative(tape, s, skip, k, tape[H_GUESS])
+            opening = a - load(s, tape[H_RIGHT] + slot)
+            possible = load(s, tape[contact + 18]) > half
+            closes = possible & (load(s, tape[H_MASK] + slot) < half) & (opening < splat(-1e-13))
+            t = load(s, guess + 1)
+            u = load(s, guess + 2)
+            bound = load(s, tape[contact + 14]) * select(n > zero, n, zero)
+            slips = fma(u, u, t * t) > bound * bound
+            pulls = n < zero
+            if velocity:
+                pulls = pulls & (load(s, tape[contact + 18] + 3) < half)
+            bad = bad | closes | (loaded & (pulls | slips))
+        k += 4 + 4 * tape[k + 3]
+    return bad
+
+
+@kernel
+def _sweep(tape, s, skip, velocity, worlds):
+    """Projected Gauss-Seidel on W in the worlds of the mask, from the guess rows; worlds that did not settle."""
+    zero = splat(0.0)
+    half = splat(0.5)
+    moving = worlds
+    for _ in range(_SWEEPS):
+        change = zero
+        largest = splat(1e-300)
+        at = tape[H_CONTACTS]
+        k = tape[H_CONTACT_PRODUCTS] + 1
+        for index in range(tape[at]):
+            contact = at + 1 + CONTACT * index
+            if skip[tape[contact + 20]] == 0:
+                slot = tape[contact + 19]
+                w = tape[k + 1]
+                possible = load(s, tape[contact + 18]) > half
+                a, b, c = _relative(tape, s, skip, k, tape[H_GUESS])
+                guess = tape[H_GUESS] + slot
+                right = tape[H_RIGHT] + slot
+                n0 = load(s, guess)
+                t0 = load(s, guess + 1)
+                u0 = load(s, guess + 2)
+                w00 = load(s, w)
+                stiff = w00 > zero
+                step = select(stiff, (a - load(s, right)) / select(stiff, w00, splat(1.0)), zero)
+                n = n0 - step
+                pushing = n > zero
+                if velocity:
+                    pushing = pushing | (load(s, tape[contact + 18] + 3) > half)
+                n = select(pushing & possible, n, zero)
+                jump = n - n0
+                b = fma(load(s, w + 1), jump, b)
+                c = fma(load(s, w + 3), jump, c)
+                w11 = load(s, w + 2)
+                w22 = load(s, w + 5)
+                size = select(w11 > w22, w11, w22) + absolute(load(s, w + 4))
+                inverse = select(size > zero, splat(1.0) / size, zero)
+                t = fma(zero - inverse, b - load(s, right + 1), t0)
+                u = fma(zero - inverse, c - load(s, right + 2), u0)
+                bound = load(s, tape[contact + 14]) * select(n > zero, n, zero)
+                length = sqrt(fma(u, u, t * t))
+                outside = length > bound
+                factor = select(outside, bound / select(outside, length, splat(1.0)), splat(1.0))
+                t = t * factor
+                u = u * factor
+                n = select(moving, n, n0)
+                t = select(moving, t, t0)
+                u = select(moving, u, u0)
+                store(s, guess, n)
+                store(s, guess + 1, t)
+                store(s, guess + 2, u)
+                for value, old in ((n, n0), (t, t0), (u, u0)):
+                    moved = absolute(value - old)
+                    change = select(moved > change, moved, change)
+                    extent = absolute(value)
+                    largest = select(extent > largest, extent, largest)
+            k += 4 + 4 * tape[k + 3]
+        moving = moving & (change > splat(1e-14) * largest)
+        if not any_lane(moving):
+            break
+    return moving
+
+
+@kernel
+def solve_contacts(tape, s, skip, velocity):
+    """Solve the contact problem left by elimination.
+
+    In: right rows hold b minus W times the present multipliers; guess rows the present multipliers. Out:
+    right rows hold the change of the multipliers, guess rows the new ones. Returns the worlds that did
+    not settle.
+    """
+    zero = splat(0.0)
+    at = tape[H_CONTACTS]
+    k = tape[H_CONTACT_PRODUCTS] + 1
+    for index in range(tape[at]):
+        contact = at + 1 + CONTACT * index
+        if skip[tape[contact + 20]] == 0:
+            right = tape[H_RIGHT] + tape[contact + 19]
+            a, b, c = _relative(tape, s, skip, k, tape[H_GUESS])
+            store(s, right, load(s, right) + a)
+            store(s, right + 1, load(s, right + 1) + b)
+            store(s, right + 2, load(s, right + 2) + c)
+            for axis in range(3):
+                held = tape[H_GUESS] + tape[contact + 19] + axis
+                store(s, tape[contact + 23] + axis, load(s, held))
+        k += 4 + 4 * tape[k + 3]
+    _stick(tape, s, skip)
+    bad = _violated(tape, s, skip, velocity)
+    stuck = zero > zero
+    if any_lane(bad):
+        for index in range(tape[at]):
+            contact = at + 1 + CONTACT * index
+            if skip[tape[contact + 20]] == 0:
+                for axis in range(3):
+                    guess = tape[H_GUESS] + tape[contact + 19] + axis
+                    old = load(s, tape[contact + 23] + axis)
+                    store(s, guess, select(bad, old, load(s, guess)))
+        stuck = _sweep(tape, s, skip, velocity, bad)
+    for index in range(tape[at]):
+        contact = at + 1 + CONTACT * index
+        if skip[tape[contact + 20]] == 0:
+            for axis in range(3):
+                slot = tape[contact + 19] + axis
+                old = load(s, tape[contact + 23] + axis)
+                store(s, tape[H_RIGHT] + slot, load(s, tape[H_GUESS] + slot) - old)
+    return stuck

@@ -1,0 +1,409 @@
+"""Direct solver: links, riders and contacts of a world in one sparse factorisation.
+
+Position stage: find multipliers such that x = x_free + M^-1 J(x_start)^T l satisfies every constraint, by
+chord Newton on A = J M^-1 J^T at the step's start (Barth et al. 1995 for rods). Velocity stage: one linear
+solve with A at the step's end. Cables are rows of an active set: taut rows take part, slack ones are
+masked; from the tenth change on only the lowest violated row changes (Murty 1974), which ends. Contacts
+are eliminated last; their Schur complement W is solved as one block assuming that loaded contacts stick,
+and where that is wrong by projected sweeps on W, whose fixed point is Coulomb's law. A world that has
+converged is frozen: no result depends on its neighbours.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from ..constraints.contacts import (
+    contact_gap,
+    contact_multiplier,
+    contact_shift,
+    contact_speed,
+)
+from ..constraints.links import (
+    link_half_square,
+    link_multiplier,
+    link_rate,
+)
+from ..constraints.riders import DECK, HEAD, rider_multiplier, rider_offset, rider_slip
+from ..kernel import kernel
+from ..math.lanes import absolute, any_lane, fma, load, select, splat, store
+from ..model.tape import (
+    CONTACT,
+    DIRECT,
+    H_BACKWARD,
+    H_CABLES,
+    H_CONTACTS,
+    H_FACTOR,
+    H_FORWARD,
+    H_GUESS,
+    H_LINK_COUPLINGS,
+    H_LINK_DIAGONALS,
+    H_LINK_MASKS,
+    H_LINKS,
+    H_MASK,
+    H_MATRIX,
+    H_MATRIX_ROWS,
+    H_PADDING,
+    H_PASSES,
+    H_POINT_DIAGONALS,
+    H_POINT_LINKS,
+    H_POINT_POINTS,
+    H_REFERENCES,
+    H_RIDERS,
+    H_RIGHT,
+    H_TOLERANCE,
+    H_UNSETTLED,
+    H_USED_MASK,
+    LINK,
+)
+from . import block_ldl
+from .base import Solver
+from .cone import solve_contacts
+from .gather import gather
+
+_FREE_CHANGES = 10
+
+
+@dataclass(frozen=True)
+class Direct(Solver):
+    """Sparse direct solve of all constraints (see the module).
+
+    Args:
+        tolerance: largest violation of a link over its length when a step ends.
+        passes: most Newton passes; a world that needs more is flagged in ``world.health``.
+    """
+
+    tolerance: float = 1e-12
+    passes: int = 60
+    code: ClassVar[int] = DIRECT
+
+
+@kernel
+def assemble(tape, s):
+    """Matrix A = J M^-1 J^T of all blocks from the stored gradients, frames and weights."""
+    zero = splat(0.0)
+    for row in range(tape[H_MATRIX_ROWS]):
+        store(s, tape[H_MATRIX] + row, zero)
+    at = tape[H_LINK_DIAGONALS]
+    for index in range(tape[at]):
+        k = at + 1 + 4 * index
+        d = tape[k + 1]
+        square = load(s, d) * load(s, d)
+        square = fma(load(s, d + 1), load(s, d + 1), square)
+        square = fma(load(s, d + 2), load(s, d + 2), square)
+        store(s, tape[k], square * (load(s, tape[k + 2]) + load(s, tape[k + 3])))
+    at = tape[H_LINK_COUPLINGS]
+    for index in range(tape[at]):
+        k = at + 1 + 5 * index
+        d = tape[k + 1]
+        e = tape[k + 2]
+        product = load(s, d) * load(s, e)
+        product = fma(load(s, d + 1), load(s, e + 1), product)
+        product = fma(load(s, d + 2), load(s, e + 2), product)
+        weight = load(s, tape[k + 3]) * load(s, tape[k + 4])
+        store(s, tape[k], fma(weight, product, load(s, tape[k])))
+    at = tape[H_POINT_DIAGONALS]
+    for index in range(tape[at]):
+        k = at + 1 + 3 * index
+        weight = load(s, tape[k + 1])
+        weight = weight * weight * load(s, tape[k + 2])
+        for row in (0, 2, 5):
+            store(s, tape[k] + row, load(s, tape[k] + row) + weight)
+    at = tape[H_POINT_LINKS]
+    for index in range(tape[at]):
+        k = at + 1 + 6 * index
+        weight = load(s, tape[k + 2]) * load(s, tape[k + 3]) * load(s, tape[k + 4])
+        d = tape[k + 5]
+        x = weight * load(s, d)
+        y = weight * load(s, d + 1)
+        z = weight * load(s, d + 2)
+        frame = tape[k + 1]
+        for row in range(3):
+            value = load(s, tape[k] + 3 * row)
+            value = fma(load(s, frame + 3 * row), x, value)
+            value = fma(load(s, frame + 3 * row + 1), y, value)
+            value = fma(load(s, frame + 3 * row + 2), z, value)
+            store(s, tape[k] + 3 * row, value)
+    at = tape[H_POINT_POINTS]
+    for index in range(tape[at]):
+        k = at + 1 + 6 * index
+        weight = load(s, tape[k + 3]) * load(s, tape[k + 4]) * load(s, tape[k + 5])
+        for row in range(3):
+            f = tape[k + 1] + 3 * row
+            x = weight * load(s, f)
+            y = weight * load(s, f + 1)
+            z = weight * load(s, f + 2)
+            for column in range(3):
+                g = tape[k + 2] + 3 * column
+                value = fma(x, load(s, g), load(s, tape[k] + 3 * row + column))
+                value = fma(y, load(s, g + 1), value)
+                store(s, tape[k] + 3 * row + column, fma(z, load(s, g + 2), value))
+
+
+@kernel
+def factorise(tape, s, skip):
+    """Mask slack cables, keep the diagonal as pivots' reference, and factorise all but W."""
+    one = splat(1.0)
+    at = tape[H_LINK_MASKS]
+    for index in range(tape[at]):
+        k = at + 1 + 3 * index
+        store(s, tape[k], load(s, tape[k]) * load(s, tape[k + 1]) * load(s, tape[k + 2]))
+    at = tape[H_PADDING]
+    for index in range(tape[at]):
+        k = at + 1 + 2 * index
+        taken = load(s, tape[k + 1])
+        store(s, tape[k], fma(load(s, tape[k]), taken, one - taken))
+    at = tape[H_REFERENCES]
+    for index in range(tape[at]):
+        k = at + 1 + 2 * index
+        store(s, tape[k], load(s, tape[k + 1]))
+    block_ldl.factor(tape, tape[H_FACTOR], s, skip)
+    at = tape[H_LINKS]
+    for index in range(tape[at]):
+        slot = tape[at + 1 + LINK * index + 15]
+        if slot >= 0:
+            store(s, tape[H_USED_MASK] + slot, load(s, tape[H_MASK] + slot))
+
+
+@kernel
+def _set_changed(tape, s):
+    """Whether a cable's state differs, in any world, from that of the present factor."""
+    at = tape[H_LINKS]
+    for index in range(tape[at]):
+        link = at + 1 + LINK * index
+        if tape[link + 10] != 0:
+            old = load(s, tape[H_USED_MASK] + tape[link + 15])
+            new = load(s, tape[H_MASK] + tape[link + 15])
+            if any_lane(absolute(new - old) > splat(0.5)):
+                return True
+    return False
+
+
+@kernel
+def refactor(tape, s, skip):
+    """Gradients are those stored; assemble and factorise anew."""
+    assemble(tape, s)
+    factorise(tape, s, skip)
+
+
+@kernel
+def _contact_rows(tape, s, skip, velocity):
+    """Right-hand sides of the contacts: minus the relative motion still unwanted."""
+    zero = splat(0.0)
+    at = tape[H_CONTACTS]
+    for index in range(tape[at]):
+        contact = at + 1 + CONTACT * index
+        if skip[tape[contact + 20]] == 0:
+            slot = tape[H_RIGHT] + tape[contact + 19]
+            if velocity:
+                wanted = load(s, tape[contact + 18] + 2)
+                store(s, slot, wanted - contact_speed(s, tape, contact, 0))
+                store(s, slot + 1, zero - contact_speed(s, tape, contact, 1))
+                store(s, slot + 2, zero - contact_speed(s, tape, contact, 2))
+            else:
+                store(s, slot, zero - contact_gap(s, tape, contact))
+                store(s, slot + 1, zero - contact_shift(s, tape, contact, 1))
+                store(s, slot + 2, zero - contact_shift(s, tape, contact, 2))
+
+
+@kernel
+def _contact_start(tape, s, skip, velocity):
+    """First guess: the multipliers at hand; loaded contacts and those about to close are taken to stick."""
+    zero = splat(0.0)
+    one = splat(1.0)
+    half = splat(0.5)
+    at = tape[H_CONTACTS]
+    for index in range(tape[at]):
+        contact = at + 1 + CONTACT * index
+        if skip[tape[contact + 20]] == 0:
+            slot = tape[contact + 19]
+            multiplier = contact_multiplier(tape, contact, velocity)
+            possible = load(s, tape[contact + 18]) > half
+            if velocity:
+                carried = load(s, tape[contact + 15]) > zero
+                possible = possible & (carried | (load(s, tape[contact + 18] + 3) > half))
+                store(s, tape[contact + 18], select(possible, one, zero))
+                loaded = possible
+            else:
+                closes = contact_gap(s, tape, contact) < zero
+                loaded = possible & ((load(s, multiplier) > zero) | closes)
+            sticks = loaded & (load(s, tape[contact + 14]) > zero)
+            store(s, tape[H_MASK] + slot, select(loaded, one, zero))
+            store(s, tape[H_MASK] + slot + 1, select(sticks, one, zero))
+            store(s, tape[H_MASK] + slot + 2, select(sticks, one, zero))
+            for axis in range(3):
+                value = load(s, multiplier + axis)
+                value = zero if velocity else select(possible, value, zero)
+                store(s, multiplier + axis, value)
+                store(s, tape[H_GUESS] + slot + axis, value)
+
+
+@kernel
+def _link_start(tape, s, velocity):
+    """First active set: rods, and cables that carried tension (or, for velocities, are held)."""
+    zero = splat(0.0)
+    one = splat(1.0)
+    at = tape[H_LINKS]
+    for index in range(tape[at]):
+        link = at + 1 + LINK * index
+        slot = tape[link + 15]
+        if slot >= 0:
+            taut = one
+            if tape[link + 10] != 0:
+                closed = load(s, tape[link + 12]) > zero
+                if velocity:
+                    closed = closed | (load(s, tape[link + 14] + 1) > splat(0.5))
+                taut = select(closed, one, zero)
+            store(s, tape[H_MASK] + slot, taut)
+        if velocity:
+            store(s, tape[link + 14] + 2, zero)
+    if velocity:
+        at = tape[H_RIDERS] + 1
+        for _ in range(tape[tape[H_RIDERS]]):
+            for axis in range(3):
+                store(s, rider_multiplier(tape, at, True) + axis, zero)
+            at += HEAD + DECK * tape[at + 6]
+
+
+@kernel
+def _link_error(tape, s, link, velocity, dt):
+    """How far a link is from where it must be, and the error allowed (both in the units of g or its rate)."""
+    length = load(s, tape[link + 8])
+    allowed = load(s, tape[H_TOLERANCE]) * length * length
+    if velocity:
+        return link_rate(s, link, tape) - load(s, tape[link + 14]), allowed / dt
+    return link_half_square(s, link, tape, length), allowed
+
+
+@kernel
+def _update_set(tape, s, velocity, dt, single):
+    """Flip cables that push or overstretch; all at once, or the lowest only. True if one was let go."""
+    zero = splat(0.0)
+    one = splat(1.0)
+    half = splat(0.5)
+    released = False
+    flipped = zero > zero
+    at = tape[H_LINKS]
+    for index in range(tape[at]):
+        link = at + 1 + LINK * index
+        if tape[link + 10] != 0:
+            slot = tape[H_MASK] + tape[link + 15]
+            row = link_multiplier(tape, link, velocity)
+            taut = load(s, slot) > half
+            slack = load(s, slot) < half
+            error, allowed = _link_error(tape, s, link, velocity, dt)
+            lets_go = taut & (load(s, row) < zero)
+            if velocity:
+                held = load(s, tape[link + 14] + 1) > half
+                lets_go = lets_go & (load(s, tape[link + 14] + 1) < half)
+                closed = (load(s, tape[link + 12]) > zero) | held
+                tightens = slack & closed & (error > allowed)
+            else:
+                tightens = slack & (error > allowed)
+            changes = lets_go | tightens
+            if single:
+                free = select(flipped, zero, one) > half
+                changes = changes & free
+                lets_go = lets_go & free
+                flipped = flipped | changes
+            if any_lane(changes):
+                store(s, slot, select(changes, one - load(s, slot), load(s, slot)))
+                store(s, row, select(lets_go, zero, load(s, row)))
+                released = released or any_lane(lets_go)
+    return released
+
+
+@kernel
+def _right_rows(tape, s, velocity, dt):
+    """Right-hand sides of links and riders; worlds that still miss the tolerance."""
+    zero = splat(0.0)
+    bad = zero > zero
+    at = tape[H_LINKS]
+    for index in range(tape[at]):
+        link = at + 1 + LINK * index
+        slot = tape[link + 15]
+        if slot >= 0:
+            error, allowed = _link_error(tape, s, link, velocity, dt)
+            error = error * load(s, tape[H_MASK] + slot)
+            store(s, tape[H_RIGHT] + slot, error)
+            bad = bad | (absolute(error) > allowed)
+    at = tape[H_RIDERS] + 1
+    for _ in range(tape[tape[H_RIDERS]]):
+        allowed = load(s, tape[H_TOLERANCE])
+        if velocity:
+            allowed = allowed / dt
+        for axis in range(3):
+            if velocity:
+                error = rider_slip(s, tape, at, axis)
+            else:
+                error = rider_offset(s, tape, at, axis)
+            store(s, tape[H_RIGHT] + tape[at + 4] + axis, zero - error)
+            bad = bad | (absolute(error) > allowed)
+        at += HEAD + DECK * tape[at + 6]
+    return bad
+
+
+@kernel
+def _accept(tape, s, skip, velocity, worlds):
+    """Add the solved changes to the multipliers of the worlds that take part."""
+    zero = splat(0.0)
+    at = tape[H_LINKS]
+    for index in range(tape[at]):
+        link = at + 1 + LINK * index
+        slot = tape[link + 15]
+        if slot >= 0:
+            row = link_multiplier(tape, link, velocity)
+            change = load(s, tape[H_RIGHT] + slot) * load(s, tape[H_MASK] + slot)
+            store(s, row, load(s, row) + select(worlds, change, zero))
+    at = tape[H_RIDERS] + 1
+    for _ in range(tape[tape[H_RIDERS]]):
+        row = rider_multiplier(tape, at, velocity)
+        for axis in range(3):
+            change = load(s, tape[H_RIGHT] + tape[at + 4] + axis)
+            store(s, row + axis, load(s, row + axis) + select(worlds, change, zero))
+        at += HEAD + DECK * tape[at + 6]
+    at = tape[H_CONTACTS]
+    for index in range(tape[at]):
+        contact = at + 1 + CONTACT * index
+        if skip[tape[contact + 20]] == 0:
+            row = contact_multiplier(tape, contact, velocity)
+            guess = tape[H_GUESS] + tape[contact + 19]
+            for axis in range(3):
+                value = select(worlds, load(s, guess + axis), load(s, row + axis))
+                store(s, row + axis, value)
+                store(s, guess + axis, value)
+
+
+@kernel
+def solve_stage(tape, s, skip, velocity, dt, target):
+    """One stage: multipliers and the rows ``target`` (positions or velocities) that meet all constraints.
+
+    ``target`` starts from the free rows; the stored gradients, frames and weights direct the impulses.
+    """
+    zero = splat(0.0)
+    _link_start(tape, s, velocity)
+    gather(tape, s, skip, velocity, target)
+    _contact_start(tape, s, skip, velocity)
+    contacts = tape[tape[H_CONTACTS]]
+    bad = zero >= zero
+    stuck = zero > zero
+    for turn in range(tape[H_PASSES]):
+        if tape[H_CABLES] > 0 and _update_set(tape, s, velocity, dt, turn >= _FREE_CHANGES):
+            gather(tape, s, skip, velocity, target)
+        late = _right_rows(tape, s, velocity, dt)
+        bad = (bad & (zero >= zero)) if turn == 0 and contacts > 0 else late
+        if not any_lane(bad):
+            break
+        if tape[H_CABLES] > 0 and _set_changed(tape, s):
+            refactor(tape, s, skip)
+        if contacts > 0:
+            _contact_rows(tape, s, skip, velocity)
+        block_ldl.forward(tape, tape[H_FORWARD], s, skip)
+        if contacts > 0:
+            stuck = solve_contacts(tape, s, skip, velocity)
+        block_ldl.backward(tape, tape[H_BACKWARD], s, skip)
+        _accept(tape, s, skip, velocity, bad)
+        gather(tape, s, skip, velocity, target)
+    failed = bad | stuck
+    store(s, tape[H_UNSETTLED], select(failed, splat(1.0), load(s, tape[H_UNSETTLED])))
