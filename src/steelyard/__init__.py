@@ -1,10 +1,12 @@
 """Steelyard: a batched physics engine that lets you weigh speed against accuracy."""
 
-from . import draw
-from .integrators.closed_form import ClosedForm, flight_impact
+from . import draw, scenes
+from .integrators.closed_form import ClosedForm, flight, flight_fall_time, flight_impact
 from .integrators.explicit_euler import ExplicitEuler
 from .integrators.rattle import Rattle
 from .integrators.symplectic_euler import SymplecticEuler
+from .kernel import kernel
+from .math.random import normal, uniform, uniform_between
 from .methods import Method
 from .scene.contacts import ContactGenerator, Ground, LinePlatform
 from .scene.forces import (
@@ -25,4 +27,46 @@ from .scene.scene import Scene
 from .solvers.direct import Direct
 from .solvers.gauss_seidel import GaussSeidel
 from .solvers.worst_first import WorstFirst
+from .stepping import advance
 from .world import World
+
+__all__ = [
+    "AnchoredBungee",
+    "AnchoredSpring",
+    "Bungee",
+    "Buoyancy",
+    "Cable",
+    "CableConstraint",
+    "ClosedForm",
+    "ContactGenerator",
+    "Direct",
+    "Drag",
+    "ExplicitEuler",
+    "GaussSeidel",
+    "Gravity",
+    "Ground",
+    "LinePlatform",
+    "Method",
+    "Particle",
+    "Rattle",
+    "Rider",
+    "Rod",
+    "RodConstraint",
+    "Scene",
+    "Spring",
+    "StiffSpring",
+    "SymplecticEuler",
+    "UserForce",
+    "World",
+    "WorstFirst",
+    "advance",
+    "draw",
+    "flight",
+    "flight_fall_time",
+    "flight_impact",
+    "kernel",
+    "normal",
+    "scenes",
+    "uniform",
+    "uniform_between",
+]

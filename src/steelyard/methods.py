@@ -35,13 +35,17 @@ class Method:
     dt: float = 1.0 / 60.0
 
     def __post_init__(self) -> None:
-        checks.number("Method", "dt", self.dt, above=0.0, remedy="Use 1/60 for sixty steps a second.")
+        checks.number(
+            "Method", "dt", self.dt, above=0.0, remedy="Use 1/60 for sixty steps a second."
+        )
         if not isinstance(self.integrator, Integrator):
             raise TypeError(
                 f"Method: integrator is {self.integrator!r}; it must be an integrator object. Use Rattle()."
             )
         if self.solver is not None and not isinstance(self.solver, Solver):
-            raise TypeError(f"Method: solver is {self.solver!r}; it must be a solver object. Use Direct().")
+            raise TypeError(
+                f"Method: solver is {self.solver!r}; it must be a solver object. Use Direct()."
+            )
         for name in ("passes", "iterations"):
             checks.number(
                 "Method",
@@ -71,7 +75,11 @@ class Method:
                 f"{name} alone cannot hold a {type(held[0]).__name__}; it needs a solver. "
                 f"Use {self._fitting(self.integrator)}."
             )
-        elif held and self.solver is not None and self.solver.staged not in self.integrator.solver_stages:
+        elif (
+            held
+            and self.solver is not None
+            and self.solver.staged not in self.integrator.solver_stages
+        ):
             raise ValueError(
                 f"{name} does not work with {type(self.solver).__name__}. "
                 f"Use {self._fitting(self.integrator)} with it."
@@ -96,11 +104,15 @@ class Method:
         if isinstance(self.integrator, ExplicitEuler) and any(
             isinstance(x, Cable | CableConstraint) and x.winch for x in scene.of(*LINKS)
         ):
-            raise ValueError("ExplicitEuler cannot drive a winch. Use SymplecticEuler() or Rattle().")
+            raise ValueError(
+                "ExplicitEuler cannot drive a winch. Use SymplecticEuler() or Rattle()."
+            )
 
     @staticmethod
     def _fitting(integrator: Integrator) -> str:
-        return "WorstFirst()" if True not in integrator.solver_stages else "Direct() or GaussSeidel()"
+        return (
+            "WorstFirst()" if True not in integrator.solver_stages else "Direct() or GaussSeidel()"
+        )
 
 
 DEFAULT = Method(Rattle(), Direct())

@@ -71,7 +71,9 @@ class Particles:
     def inverse_mass(self, value: Any) -> None:
         given = np.asarray(value, dtype=np.float64)
         if not (given >= 0.0).all():
-            raise ValueError(f"World: inverse_mass has {given.min()!r}; the limit is 0. Use 0 or more.")
+            raise ValueError(
+                f"World: inverse_mass has {given.min()!r}; the limit is 0. Use 0 or more."
+            )
         self._world._set((PARTICLES, "inverse_mass"), given, self._count)
 
     @property

@@ -18,7 +18,6 @@ from .model.tape import (
     CLOSED_FORM,
     EXPLICIT_EULER,
     H_CONSTRAINED,
-    H_CONTACTS,
     H_DT,
     H_INTEGRATOR,
     H_NONFINITE,
@@ -30,7 +29,6 @@ from .model.tape import (
     H_TIME,
     H_VELOCITY,
     H_WINCHES,
-    HEADER,
     RATTLE,
     SYMPLECTIC_EULER,
     WORST_FIRST,
@@ -105,7 +103,7 @@ def _step(tape, s, skip, ends, values, dt, phase, fresh):
     if integrator == RATTLE:
         if phase & FIRST_HALF:
             if constrained:
-                begin_step(tape, s, skip, dt)
+                fresh = begin_step(tape, s, skip, dt) or fresh
             _advance_controls(tape, s, dt)
             rattle_first_half(tape, s, dt)
             if constrained:
@@ -116,7 +114,7 @@ def _step(tape, s, skip, ends, values, dt, phase, fresh):
                 velocity_stage(tape, s, skip, dt)
     elif integrator == SYMPLECTIC_EULER:
         if constrained and tape[H_SOLVER] != WORST_FIRST:
-            begin_step(tape, s, skip, dt)
+            fresh = begin_step(tape, s, skip, dt) or fresh
         _advance_controls(tape, s, dt)
         symplectic_euler_step(tape, s, dt)
         if constrained:
@@ -135,7 +133,9 @@ def _step(tape, s, skip, ends, values, dt, phase, fresh):
 
 
 @kernel
-def advance(tape, s, skip, ends, values, state, given, given_rows, first, last, worlds, substeps, phase):
+def advance(
+    tape, s, skip, ends, values, state, given, given_rows, first, last, worlds, substeps, phase
+):
     """Advance the worlds of blocks ``first`` ... ``last - 1`` by ``substeps``.
 
     Args:

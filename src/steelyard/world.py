@@ -43,9 +43,13 @@ class World:
         for name, value in (("worlds", worlds), ("threads", threads)):
             checks.number("World", name, value, least=1, remedy="Use at least one.")
             if int(value) != value:
-                raise ValueError(f"World: {name} is {value!r}; it must be a whole number. Round it.")
+                raise ValueError(
+                    f"World: {name} is {value!r}; it must be a whole number. Round it."
+                )
         if not scene.particles:
-            raise ValueError("World: the scene has 0 particles; it must have at least 1. Add a Particle.")
+            raise ValueError(
+                "World: the scene has 0 particles; it must have at least 1. Add a Particle."
+            )
         self.worlds = int(worlds)
         self.threads = int(threads)
         self.method = method
@@ -196,6 +200,38 @@ class World:
         """Time [s] of every world, a view of shape (worlds,)."""
         return self._view(PARTICLES, "time")[:, 0]
 
+    # For kernels that read and write worlds in place
+
+    @property
+    def state(self) -> np.ndarray:
+        """The whole state, shape (state rows, padded worlds); ``row`` says what lies where."""
+        return self._state
+
+    def row(self, thing: Any, name: str) -> int:
+        """First row in ``state`` of a part of it.
+
+        Args:
+            thing: "particles", or a link, rider or generator of the scene.
+            name: "position" (3 rows per particle), "velocity", "time", "nonfinite"; "length" or "rate" of a
+                winch; "weights" or "rates" of a rider.
+        """
+        return self.model.places[thing, name][0]
+
+    @property
+    def launch(self) -> tuple[np.ndarray, ...]:
+        """The first eight arguments of ``steelyard.advance``, for kernels that step worlds themselves.
+
+        Raises:
+            ValueError: the scene has user-written forces or contacts, which only ``step`` can call.
+        """
+        if self._split:
+            raise ValueError(
+                "World.launch: the scene has user-written forces or contacts; use World.step."
+            )
+        if self._stale:
+            self._prepare()
+        return (self.model.tape, *self._scratch[0], self._state, self._given, self._given_rows)
+
     # Diagnostics
 
     @property
@@ -273,7 +309,9 @@ class World:
         old = None if before is None else (self.model, self._state)
         model = compile_model(self.scene, self.method)
         width = -(-self.worlds // LANES)
-        width = LANES * (width if width % 2 else width + 1)  # odd multiples: rows do not alias in cache
+        width = LANES * (
+            width if width % 2 else width + 1
+        )  # odd multiples: rows do not alias in cache
         needed = 8 * width * model.state_rows
         if needed > available_memory():
             raise MemoryError(
@@ -342,7 +380,9 @@ class World:
             f"  {self.bytes_per_world} bytes per world, {self.model.rows * LANES * 8} bytes of scratch per thread",
         ]
         if self.model.dropped:
-            lines.append(f"  {len(self.model.dropped)} rods implied by the others have no row of their own")
+            lines.append(
+                f"  {len(self.model.dropped)} rods implied by the others have no row of their own"
+            )
         return "\n".join(lines)
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from ..kernel import kernel
 from ..math.lanes import any_lane, fma, load, select, splat, sqrt, store
-from ..model.tape import CONTACT, H_CONTACTS
+from ..model.tape import CONTACT, GROUND, H_CONTACTS
 
 # Share of a penetration found at the start that one step takes back.
 _RECOVERY = 0.2
@@ -36,12 +36,14 @@ def contact_targets(tape, s, dt, skip):
     Writes near (1 where the gap can close within the step), the floor under the gap, the separation
     speed after an impact, and held (1 where the contact started in penetration: then its normal is held
     like a link, so that pushing out leaves no velocity). ``skip`` is set for blocks near in no world.
+    Returns whether a factor made before no longer fits: another choice of blocks, or frames that turn.
 
     The speed of an impact is that at the surface, v^2 = v_n^2 + 2 a_n gap; speed that one step's
     acceleration alone explains is not bounced since a resting contact starts the step with none.
     """
     zero = splat(0.0)
     one = splat(1.0)
+    changed = False
     at = tape[H_CONTACTS]
     for index in range(tape[at]):
         contact = at + 1 + CONTACT * index
@@ -52,9 +54,13 @@ def contact_targets(tape, s, dt, skip):
         square = zero
         weight = zero
         for component in range(3):
-            relative = load(s, tape[contact + 3] + component) - load(s, tape[contact + 4] + component)
+            relative = load(s, tape[contact + 3] + component) - load(
+                s, tape[contact + 4] + component
+            )
             square = fma(relative, relative, square)
-            relative = load(s, tape[contact + 9] + component) - load(s, tape[contact + 10] + component)
+            relative = load(s, tape[contact + 9] + component) - load(
+                s, tape[contact + 10] + component
+            )
             weight = fma(relative, relative, weight)
         reach = dt * (sqrt(square) + dt * sqrt(weight))
         near = gap < splat(4.0) * reach
@@ -70,17 +76,23 @@ def contact_targets(tape, s, dt, skip):
         store(s, tape[contact + 18] + 1, select(low, splat(1.0 - _RECOVERY) * gap, zero))
         store(s, tape[contact + 18] + 2, select(low, zero, bounce))
         store(s, tape[contact + 18] + 3, select(low, one, zero))
-        if any_lane(near):
-            skip[tape[contact + 20]] = 0
-        else:
-            skip[tape[contact + 20]] = 1
+        left_out = 0 if any_lane(near) else 1
+        changed = changed or skip[tape[contact + 20]] != left_out or tape[contact] != GROUND
+        skip[tape[contact + 20]] = left_out
+    return changed
 
 
 @kernel
 def contact_gap(s, tape, contact):
     """Gap at the current positions above its floor, the normal kept from the step's start."""
     moved = contact_motion(
-        s, tape[contact + 16], 0, tape[contact + 1], tape[contact + 2], tape[contact + 21], tape[contact + 22]
+        s,
+        tape[contact + 16],
+        0,
+        tape[contact + 1],
+        tape[contact + 2],
+        tape[contact + 21],
+        tape[contact + 22],
     )
     return load(s, tape[contact + 17]) + moved - load(s, tape[contact + 18] + 1)
 

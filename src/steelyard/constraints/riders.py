@@ -1,7 +1,7 @@
 """Riders: a particle held at the weighted mean of others, x = sum of w_i x_i, three rows each.
 
 Record on the tape: x, v, impulse, multipliers, slot, inverse mass, count of deck particles, weights, rates, work
-rows (coefficients, then velocity multipliers), then per deck particle: x, v, impulse, inverse mass.
+rows (coefficients, then velocity multipliers), accelerations, then per deck particle: x, v, impulse, inverse mass.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from ..kernel import kernel
 from ..math.lanes import fma, load, splat, store
 from ..model.tape import H_RIDERS
 
-HEAD = 10
+HEAD = 11
 DECK = 4
 
 
@@ -53,13 +53,16 @@ def rider_coefficients(tape, s):
 
 @kernel
 def rider_advance(tape, s, dt):
-    """Move the weights by their rates over ``dt``."""
+    """Move the weights over ``dt`` at constant acceleration."""
     at = tape[H_RIDERS] + 1
     for _ in range(tape[tape[H_RIDERS]]):
         count = tape[at + 6]
         for k in range(count):
             rate = load(s, tape[at + 8] + k)
-            store(s, tape[at + 7] + k, fma(dt, rate, load(s, tape[at + 7] + k)))
+            gain = dt * load(s, tape[at + 10] + k)
+            mean = fma(splat(0.5), gain, rate)
+            store(s, tape[at + 7] + k, fma(dt, mean, load(s, tape[at + 7] + k)))
+            store(s, tape[at + 8] + k, rate + gain)
         at += HEAD + DECK * count
 
 

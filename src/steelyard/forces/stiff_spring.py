@@ -9,7 +9,7 @@ Record: x, v, acceleration, force, inverse mass, first row of p, first row of th
 from __future__ import annotations
 
 from ..kernel import kernel
-from ..math.lanes import fma, load, splat, store
+from ..math.lanes import fma, load, store
 from ..model.tape import H_FORCED, H_STIFF_SPRINGS
 
 RECORD = 8
@@ -32,4 +32,3 @@ def flow_stiff_springs(tape, s):
             v = load(s, tape[k + 1] + component)
             store(s, tape[k] + component, fma(load(s, p), y, fma(load(s, p + 1), v, centre)))
             store(s, tape[k + 1] + component, fma(load(s, p + 2), y, load(s, p + 3) * v))
-

@@ -61,7 +61,9 @@ def _phi(rate, time):
     """e^(-ct), phi1 and phi2, by series where c t is small."""
     z = rate * time
     if abs(z) < 1e-2:
-        one = 1.0 - z / 2 * (1.0 - z / 3 * (1.0 - z / 4 * (1.0 - z / 5 * (1.0 - z / 6 * (1.0 - z / 7)))))
+        one = 1.0 - z / 2 * (
+            1.0 - z / 3 * (1.0 - z / 4 * (1.0 - z / 5 * (1.0 - z / 6 * (1.0 - z / 7))))
+        )
         two = 0.5 * (1.0 - z / 3 * (1.0 - z / 4 * (1.0 - z / 5 * (1.0 - z / 6 * (1.0 - z / 7)))))
         return math.exp(-z), time * one, time * time * two
     one = -math.expm1(-z) / rate

@@ -20,7 +20,7 @@ from ..scene.forces import (
     StiffSpring,
     UserForce,
 )
-from ..scene.links import Cable, CableConstraint, Rod, RodConstraint
+from ..scene.links import Cable, CableConstraint, RodConstraint
 from ..scene.particle import Particle
 from ..scene.rider import Rider
 from ..scene.scene import CONTACTS, LINKS, Scene
@@ -30,6 +30,9 @@ from .parameters import Key, Parameters, Slot
 from .tape import CONTACT, GROUND, HEADER, LINE, LINK, USER
 
 PARTICLES = "particles"
+
+#: Header fields that are -1, not an empty section, where a scene has no such rows.
+_ABSENT = ("user_forces", "force", "start", "free", "impulse", "dense")
 
 
 @dataclass
@@ -184,6 +187,7 @@ class Compiler:
         for rider in self.riders:
             self.state((rider, "weights"), rider.weights)
             self.state((rider, "rates"), np.zeros(len(rider.deck)))
+            self.state((rider, "accelerations"), np.zeros(len(rider.deck)))
 
     def _multipliers(self) -> None:
         """Impulses of the last step, from which the next one starts."""
@@ -225,7 +229,9 @@ class Compiler:
 
         declare((PARTICLES, "inverse_mass"), inverse, check_mass)
         declare((PARTICLES, "damping"), [p.damping for p in self.particles])
-        own = [self.scene.gravity if p.acceleration is None else p.acceleration for p in self.particles]
+        own = [
+            self.scene.gravity if p.acceleration is None else p.acceleration for p in self.particles
+        ]
         follows = np.array([p.acceleration is None for p in self.particles])
         declare((PARTICLES, "acceleration"), np.array(own, dtype=np.float64).ravel())
         declare((PARTICLES, "radius"), [p.radius for p in self.particles])
@@ -286,7 +292,15 @@ class Compiler:
             else:
                 a, b, end = spring.a, self.at("position", spring.b), self.at("force", spring.b)
             single = int(isinstance(spring, Bungee | AnchoredBungee))
-            springs += [self.at("position", a), b, self.at("force", a), end, stiffness, rest, single]
+            springs += [
+                self.at("position", a),
+                b,
+                self.at("force", a),
+                end,
+                stiffness,
+                rest,
+                single,
+            ]
         self.sections["springs"] = springs
         self.sections["gravities"] = []
         gravities = scene.of(Gravity)
@@ -322,7 +336,9 @@ class Compiler:
                     flow = self.slot(
                         2,
                         ((drag, "linear"), (PARTICLES, "inverse_mass")),
-                        lambda k1, inverse, i=self.of(p): derived.drag(k1, inverse[i : i + 1], share)[:, 0],
+                        lambda k1, inverse, i=self.of(p): derived.drag(
+                            k1, inverse[i : i + 1], share
+                        )[:, 0],
                     )
                     f = self.at("force", p) if force >= 0 else -1
                     self.sections["drags"] += [
@@ -348,7 +364,9 @@ class Compiler:
             ((spring, "stiffness"), (spring, "damping"), mass),
             lambda k, c, inverse: derived.oscillator(k, c, inverse[i : i + 1], dt)[:, 0],
         )
-        give = self.slot(1, ((spring, "stiffness"), mass), lambda k, inverse: 1 / (k * inverse[i : i + 1]))
+        give = self.slot(
+            1, ((spring, "stiffness"), mass), lambda k, inverse: 1 / (k * inverse[i : i + 1])
+        )
         f = self.at("force", spring.particle) if self.header["force"] >= 0 else -1
         self.sections["stiff_springs"] += [
             self.at("position", spring.particle),
@@ -383,7 +401,9 @@ class Compiler:
                 winches += [length_row, rate_row]
             else:
                 length_row, rate_row = self.parameter(link, "length", length), self.zero
-            restitution = self.parameter(link, "restitution", link.restitution) if cable else self.zero
+            restitution = (
+                self.parameter(link, "restitution", link.restitution) if cable else self.zero
+            )
             if isinstance(link, RodConstraint | CableConstraint):
                 a = link.particle
                 anchor = self.parameter(link, "anchor", link.anchor)
@@ -417,6 +437,7 @@ class Compiler:
                 self.at("position", load), self.at("velocity", load), self.at("impulse", load),
                 self.place(rider, "multiplier"), -1, self.header["inverse_mass"] + self.of(load),
                 len(rider.deck), self.place(rider, "weights"), self.place(rider, "rates"), held,
+                self.place(rider, "accelerations"),
             ]  # fmt: skip
             for p in rider.deck:
                 records += [
@@ -531,7 +552,7 @@ class Compiler:
         empty = HEADER + len(body)
         body.append(0)
         for name in names:
-            if self.header[name] == -1 and name not in ("user_forces", "force", "start", "free", "impulse"):
+            if self.header[name] == -1 and name not in _ABSENT:
                 self.header[name] = empty
         model = self.model
         model.tape = np.array([self.header[name] for name in names] + body, dtype=np.int64)

@@ -61,7 +61,9 @@ def oscillator(
     slow = np.where(b + w > 0, square / np.where(b + w > 0, b + w, 1), 0)
     fast = b + w
     over = discriminant < 0
-    grown = np.where(over, (np.exp(-slow * h) + np.exp(-fast * h)) / 2, np.exp(-b * h) * np.cos(w * h))
+    grown = np.where(
+        over, (np.exp(-slow * h) + np.exp(-fast * h)) / 2, np.exp(-b * h) * np.cos(w * h)
+    )
     width = np.where(w > 0, w, 1)
     turned = np.where(
         over,

@@ -14,6 +14,9 @@ if TYPE_CHECKING:
 
 _DIAGONAL = (0, 2, 5)
 
+#: Up to so many contacts per world Newton's method on the friction law is worth its dense system.
+DENSE_CONTACTS = 8
+
 # A movable particle of a block row: index, row of its coefficient, row of its inverse mass.
 Node = tuple[int, int, int]
 
@@ -89,7 +92,8 @@ class Network:
         ends = [frozenset(p for p, _, _ in self._ends(link)) for link in kept]
         self.link_blocks = [[kept[k] for k in block] for block in sparsity.group(ends)]
         nodes = [
-            frozenset(p for link in block for p, _, _ in self._ends(link)) for block in self.link_blocks
+            frozenset(p for link in block for p, _, _ in self._ends(link))
+            for block in self.link_blocks
         ]
         self.points: dict[int, list[Node]] = {}
         self.frames: dict[int, int] = {}
@@ -106,7 +110,7 @@ class Network:
             self.frames[block] = identity
             records[at + 4] = 3 * block
             nodes.append(frozenset(p for p, _, _ in self.points[block]))
-            at += 10 + 4 * len(deck)
+            at += 11 + 4 * len(deck)
         self.structural = len(nodes)
         for k, (_, a, b, _) in enumerate(c.contacts):
             block = len(nodes)
@@ -141,9 +145,7 @@ class Network:
     def _rows(self) -> None:
         """Scratch rows of the matrix, its factor and the solution."""
         c = self.c
-        pairs = [
-            (row, column) for row in range(self.count) for column in self.pattern[row]
-        ]
+        pairs = [(row, column) for row in range(self.count) for column in self.pattern[row]]
         size = 6 * self.count + 9 * len(pairs)
         matrix = c.take(size)
         c.header["matrix"] = matrix
@@ -154,7 +156,7 @@ class Network:
         self.inverse = {position: c.take(6) for position in range(self.structural)}
         self.p = {pair: c.take(9) for pair in pairs if pair[1] < self.structural}
         self.reference = {position: c.take(3) for position in range(self.count)}
-        for name in ("right", "guess", "mask", "used_mask"):
+        for name in ("right", "guess", "mask", "used_mask", "total"):
             c.header[name] = c.take(3 * self.count)
         self.place = {block: position for position, block in enumerate(self.order)}
 
@@ -243,7 +245,11 @@ class Network:
                     padding += [diagonal + _DIAGONAL[row], mask + slot]
                 for column in range(row):
                     if {slot, 3 * block + column} & cables:
-                        masks += [diagonal + _lower(row, column), mask + slot, mask + 3 * block + column]
+                        masks += [
+                            diagonal + _lower(row, column),
+                            mask + slot,
+                            mask + 3 * block + column,
+                        ]
             for column_position in self.pattern[position]:
                 other = self.order[column_position]
                 entry = self.a[position, column_position]
@@ -268,12 +274,15 @@ class Network:
         for i, block in enumerate(self.order):
             contact = i >= self.structural
             columns = self.pattern[i]
-            factor += [self.diagonal[i], -1 if contact else self.inverse[i], self.reference[i], block]
+            factor += [
+                self.diagonal[i],
+                -1 if contact else self.inverse[i],
+                self.reference[i],
+                block,
+            ]
             factor.append(len(columns))
             for j in columns:
-                shared = [
-                    k for k in self.pattern[j] if k in set(columns) and k < self.structural
-                ]
+                shared = [k for k in self.pattern[j] if k in set(columns) and k < self.structural]
                 outer = j >= self.structural
                 factor += [
                     self.a[i, j],
@@ -318,7 +327,12 @@ class Network:
                 for column in range(row + 1):
                     entry = _lower(row, column)
                     reference = self.reference[i] + row if row == column else -1
-                    copies += [diagonal[i] + entry, self.diagonal[i] + entry, slot + row, slot + column]
+                    copies += [
+                        diagonal[i] + entry,
+                        self.diagonal[i] + entry,
+                        slot + row,
+                        slot + column,
+                    ]
                     copies.append(reference)
             columns = [j for j in self.pattern[i] if j >= first]
             factor += [diagonal[i], inverse[i], self.reference[i], self.order[i], len(columns)]
@@ -344,11 +358,14 @@ class Network:
         for block in range(first, self.count):
             i = self.place[block]
             others = [(self.a[i, j], j, 0) for j in self.pattern[i] if j >= first]
-            others += [(self.a[k, i], k, 1) for k in range(i + 1, self.count) if i in self.pattern[k]]
+            others += [
+                (self.a[k, i], k, 1) for k in range(i + 1, self.count) if i in self.pattern[k]
+            ]
             products += [3 * block, self.diagonal[i], block, len(others)]
             for rows, k, transposed in others:
                 products += [rows, 3 * self.order[k], transposed, self.order[k]]
         size = self.count - first
+        c.header["dense"] = c.take(3 * size * (3 * size + 1)) if size <= DENSE_CONTACTS else -1
         c.sections |= {
             "contact_copies": copies, "contact_factor": factor, "contact_forward": forward,
             "contact_backward": backward, "contact_products": products,

@@ -36,7 +36,9 @@ class Parameters:
         self.checks: dict[Key, Callable[[np.ndarray], None]] = {}
         self.slots: list[Slot] = []
 
-    def declare(self, key: Key, value: Any, check: Callable[[np.ndarray], None] | None = None) -> None:
+    def declare(
+        self, key: Key, value: Any, check: Callable[[np.ndarray], None] | None = None
+    ) -> None:
         """Make ``value`` (a scalar or a vector) assignable under ``key``."""
         self.values[key] = np.atleast_1d(np.asarray(value, dtype=np.float64))
         if check is not None:

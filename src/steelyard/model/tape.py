@@ -62,12 +62,14 @@ from __future__ import annotations
     H_CONTACT_FORWARD,
     H_CONTACT_BACKWARD,
     H_CONTACT_PRODUCTS,
+    H_DENSE,
+    H_TOTAL,
     H_RIGHT,
     H_GUESS,
     H_MASK,
     H_USED_MASK,
-) = range(57)
-HEADER = 57
+) = range(59)
+HEADER = 59
 
 # Width of the records of links and contacts; ``model.compile`` writes them field by field.
 LINK = 16

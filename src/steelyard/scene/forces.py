@@ -60,7 +60,9 @@ class Drag:
     def __post_init__(self) -> None:
         remedy = "Negative drag would feed energy in; use 0 for none."
         self.linear = checks.number("Drag", "linear", self.linear, least=0.0, remedy=remedy)
-        self.quadratic = checks.number("Drag", "quadratic", self.quadratic, least=0.0, remedy=remedy)
+        self.quadratic = checks.number(
+            "Drag", "quadratic", self.quadratic, least=0.0, remedy=remedy
+        )
         self.wind = checks.vector("Drag", "wind", self.wind)
 
 
@@ -204,5 +206,13 @@ class UserForce:
 
 
 Force = (
-    Gravity | Drag | Spring | Bungee | AnchoredSpring | AnchoredBungee | StiffSpring | Buoyancy | UserForce
+    Gravity
+    | Drag
+    | Spring
+    | Bungee
+    | AnchoredSpring
+    | AnchoredBungee
+    | StiffSpring
+    | Buoyancy
+    | UserForce
 )

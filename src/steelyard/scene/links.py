@@ -18,7 +18,12 @@ def _length(owner: str, name: str, value: float) -> float:
 
 def _restitution(owner: str, value: float) -> float:
     return checks.number(
-        owner, "restitution", value, least=0.0, most=1.0, remedy="0 is no rebound, 1 loses no energy."
+        owner,
+        "restitution",
+        value,
+        least=0.0,
+        most=1.0,
+        remedy="0 is no rebound, 1 loses no energy.",
     )
 
 

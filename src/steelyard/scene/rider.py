@@ -14,8 +14,9 @@ from .particle import Particle
 class Rider:
     """A particle held at barycentric coordinates of others: x = sum of weight_i x_i.
 
-    The weights are prescribed: ``world[rider].weights`` (worlds, deck) sets them, and
-    ``world[rider].rates`` (worlds, deck) [1/s] moves them as the world steps. The rider presses on the
+    The weights are prescribed: ``world[rider].weights`` (worlds, deck) sets them, ``world[rider].rates`` [1/s] and
+    ``world[rider].accelerations`` [1/s^2] of the same shape move them as the world steps. A rate that jumps is a
+    blow; an acceleration is a force. The rider presses on the
     deck with its full inertia; spreading its mass over the deck particles instead is cheaper and neglects
     the inertia of its motion over the deck (see ``steelyard.scenes.lumped_masses``).
 
@@ -34,14 +35,22 @@ class Rider:
 
     def __post_init__(self) -> None:
         self.deck = tuple(self.deck)
-        if not self.deck or self.particle in self.deck or len(set(map(id, self.deck))) != len(self.deck):
+        if (
+            not self.deck
+            or self.particle in self.deck
+            or len(set(map(id, self.deck))) != len(self.deck)
+        ):
             raise ValueError(
                 f"Rider: deck has {len(self.deck)} particles; it must have at least 1, each once, and not "
                 "the load itself. Give the particles that carry the load."
             )
         if not self.particle.movable:
-            raise ValueError("Rider: inverse_mass of the load is 0; it must be above 0. Give it a mass.")
-        given = np.full(len(self.deck), 1.0 / len(self.deck)) if self.weights is None else self.weights
+            raise ValueError(
+                "Rider: inverse_mass of the load is 0; it must be above 0. Give it a mass."
+            )
+        given = (
+            np.full(len(self.deck), 1.0 / len(self.deck)) if self.weights is None else self.weights
+        )
         weights = np.asarray(given, dtype=np.float64)
         total = float(weights.sum())
         if weights.shape != (len(self.deck),) or not abs(total - 1.0) < 1e-9:

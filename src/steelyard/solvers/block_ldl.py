@@ -169,8 +169,12 @@ def forward(tape, at, s, skip):
                     x1 = zero - load(s, x + 1)
                     x2 = zero - load(s, x + 2)
                     y0 = fma(load(s, p + 2), x2, fma(load(s, p + 1), x1, fma(load(s, p), x0, y0)))
-                    y1 = fma(load(s, p + 5), x2, fma(load(s, p + 4), x1, fma(load(s, p + 3), x0, y1)))
-                    y2 = fma(load(s, p + 8), x2, fma(load(s, p + 7), x1, fma(load(s, p + 6), x0, y2)))
+                    y1 = fma(
+                        load(s, p + 5), x2, fma(load(s, p + 4), x1, fma(load(s, p + 3), x0, y1))
+                    )
+                    y2 = fma(
+                        load(s, p + 8), x2, fma(load(s, p + 7), x1, fma(load(s, p + 6), x0, y2))
+                    )
             store(s, y, y0)
             store(s, y + 1, y1)
             store(s, y + 2, y2)
@@ -211,8 +215,12 @@ def backward(tape, at, s, skip):
                     x1 = zero - load(s, x + 1)
                     x2 = zero - load(s, x + 2)
                     z0 = fma(load(s, p + 6), x2, fma(load(s, p + 3), x1, fma(load(s, p), x0, z0)))
-                    z1 = fma(load(s, p + 7), x2, fma(load(s, p + 4), x1, fma(load(s, p + 1), x0, z1)))
-                    z2 = fma(load(s, p + 8), x2, fma(load(s, p + 5), x1, fma(load(s, p + 2), x0, z2)))
+                    z1 = fma(
+                        load(s, p + 7), x2, fma(load(s, p + 4), x1, fma(load(s, p + 1), x0, z1))
+                    )
+                    z2 = fma(
+                        load(s, p + 8), x2, fma(load(s, p + 5), x1, fma(load(s, p + 2), x0, z2))
+                    )
             store(s, y, z0)
             store(s, y + 1, z1)
             store(s, y + 2, z2)

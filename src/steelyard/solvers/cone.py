@@ -2,7 +2,8 @@
 
 Find multipliers l with u = W l - b, per contact: l_n >= 0, u_n >= 0, l_n u_n = 0, |l_t| <= mu l_n, and l_t opposite to
 u_t where it slides (Signorini and Coulomb). First try: loaded contacts stick, one solve. Worlds where that
-breaks a condition are swept: projected Gauss-Seidel on W, whose fixed point is the law itself.
+breaks a condition take Newton's method (``cone_newton``), and where that fails are swept: projected
+Gauss-Seidel on W, whose fixed point is the law itself.
 """
 
 from __future__ import annotations
@@ -17,72 +18,70 @@ from ..model.tape import (
     H_CONTACT_FORWARD,
     H_CONTACT_PRODUCTS,
     H_CONTACTS,
+    H_DENSE,
     H_GUESS,
     H_MASK,
     H_RIGHT,
+    H_TOTAL,
 )
 from . import block_ldl
+from .cone_newton import newton
+from .cone_rows import relative_motion
 
 _SWEEPS = 400
-
-
-@kernel
-def _relative(tape, s, skip, k, source):
-    """(W l)_c for the contact whose product record starts at ``k``: three lane vectors.
-
-    Record: slot, diagonal six rows, block, count, then per other contact: nine rows, its slot, whether
-    transposed, its block. ``source`` is the first row of l by slot.
-    """
-    slot = source + tape[k]
-    w = tape[k + 1]
-    n = load(s, slot)
-    t = load(s, slot + 1)
-    u = load(s, slot + 2)
-    a = fma(load(s, w + 3), u, fma(load(s, w + 1), t, load(s, w) * n))
-    b = fma(load(s, w + 4), u, fma(load(s, w + 2), t, load(s, w + 1) * n))
-    c = fma(load(s, w + 5), u, fma(load(s, w + 4), t, load(s, w + 3) * n))
-    for other in range(tape[k + 3]):
-        o = k + 4 + 4 * other
-        if skip[tape[o + 3]] == 0:
-            m = tape[o]
-            x = source + tape[o + 1]
-            n = load(s, x)
-            t = load(s, x + 1)
-            u = load(s, x + 2)
-            if tape[o + 2] == 0:
-                a = fma(load(s, m + 2), u, fma(load(s, m + 1), t, fma(load(s, m), n, a)))
-                b = fma(load(s, m + 5), u, fma(load(s, m + 4), t, fma(load(s, m + 3), n, b)))
-                c = fma(load(s, m + 8), u, fma(load(s, m + 7), t, fma(load(s, m + 6), n, c)))
-            else:
-                a = fma(load(s, m + 6), u, fma(load(s, m + 3), t, fma(load(s, m), n, a)))
-                b = fma(load(s, m + 7), u, fma(load(s, m + 4), t, fma(load(s, m + 1), n, b)))
-                c = fma(load(s, m + 8), u, fma(load(s, m + 5), t, fma(load(s, m + 2), n, c)))
-    return a, b, c
+_SOFTNESS = 1e-6
+_REPEATS = 2
 
 
 @kernel
 def _stick(tape, s, skip):
-    """Solve W l = b over the masked rows into the guess rows."""
+    """Solve W l = b over the masked rows into the guess rows.
+
+    Friction is redundant where links join contacts. A share ``_SOFTNESS`` on the diagonal makes the solution the
+    one of least norm, which spreads friction and so stays inside the cones where it can; repeating the
+    solve on what is left of b (the proximal point method) takes the softness out again.
+    """
+    zero = splat(0.0)
     at = tape[H_CONTACT_COPIES]
     for index in range(tape[at]):
         k = at + 1 + 5 * index
         taken = load(s, tape[k + 2]) * load(s, tape[k + 3])
         value = load(s, tape[k + 1]) * taken
         if tape[k + 4] >= 0:
-            value = fma(load(s, tape[k + 4]), splat(1.0) - taken, value)
+            value = fma(load(s, tape[k + 4]), splat(1.0 + _SOFTNESS) - taken, value)
         store(s, tape[k], value)
-    at = tape[H_CONTACTS]
-    for index in range(tape[at]):
-        contact = at + 1 + CONTACT * index
-        if skip[tape[contact + 20]] == 0:
-            slot = tape[contact + 19]
-            for axis in range(3):
-                row = slot + axis
-                value = load(s, tape[H_RIGHT] + row) * load(s, tape[H_MASK] + row)
-                store(s, tape[H_GUESS] + row, value)
     block_ldl.factor(tape, tape[H_CONTACT_FACTOR], s, skip)
-    block_ldl.forward(tape, tape[H_CONTACT_FORWARD], s, skip)
-    block_ldl.backward(tape, tape[H_CONTACT_BACKWARD], s, skip)
+    at = tape[H_CONTACTS]
+    guess = tape[H_GUESS]
+    total = tape[H_TOTAL]
+    for index in range(tape[at]):
+        slot = tape[at + 1 + CONTACT * index + 19]
+        for row in range(slot, slot + 3):
+            store(s, total + row, zero)
+    for _ in range(_REPEATS):
+        k = tape[H_CONTACT_PRODUCTS] + 1
+        for index in range(tape[at]):
+            contact = at + 1 + CONTACT * index
+            if skip[tape[contact + 20]] == 0:
+                slot = tape[contact + 19]
+                a, b, c = relative_motion(tape, s, skip, k, total)
+                right = tape[H_RIGHT] + slot
+                mask = tape[H_MASK] + slot
+                store(s, guess + slot, (load(s, right) - a) * load(s, mask))
+                store(s, guess + slot + 1, (load(s, right + 1) - b) * load(s, mask + 1))
+                store(s, guess + slot + 2, (load(s, right + 2) - c) * load(s, mask + 2))
+            k += 4 + 4 * tape[k + 3]
+        block_ldl.forward(tape, tape[H_CONTACT_FORWARD], s, skip)
+        block_ldl.backward(tape, tape[H_CONTACT_BACKWARD], s, skip)
+        for index in range(tape[at]):
+            slot = tape[at + 1 + CONTACT * index + 19]
+            for row in range(slot, slot + 3):
+                value = load(s, guess + row) * load(s, tape[H_MASK] + row)
+                store(s, total + row, load(s, total + row) + value)
+    for index in range(tape[at]):
+        slot = tape[at + 1 + CONTACT * index + 19]
+        for row in range(slot, slot + 3):
+            store(s, guess + row, load(s, total + row))
 
 
 @kernel
@@ -100,7 +99,7 @@ def _violated(tape, s, skip, velocity):
             loaded = load(s, tape[H_MASK] + slot) > half
             guess = tape[H_GUESS] + slot
             n = load(s, guess)
-            a, _, _ = _relative(tape, s, skip, k, tape[H_GUESS])
+            a, _, _ = relative_motion(tape, s, skip, k, tape[H_GUESS])
             opening = a - load(s, tape[H_RIGHT] + slot)
             possible = load(s, tape[contact + 18]) > half
             closes = possible & (load(s, tape[H_MASK] + slot) < half) & (opening < splat(-1e-13))
@@ -133,7 +132,7 @@ def _sweep(tape, s, skip, velocity, worlds):
                 slot = tape[contact + 19]
                 w = tape[k + 1]
                 possible = load(s, tape[contact + 18]) > half
-                a, b, c = _relative(tape, s, skip, k, tape[H_GUESS])
+                a, b, c = relative_motion(tape, s, skip, k, tape[H_GUESS])
                 guess = tape[H_GUESS] + slot
                 right = tape[H_RIGHT] + slot
                 n0 = load(s, guess)
@@ -174,10 +173,23 @@ def _sweep(tape, s, skip, velocity, worlds):
                     extent = absolute(value)
                     largest = select(extent > largest, extent, largest)
             k += 4 + 4 * tape[k + 3]
-        moving = moving & (change > splat(1e-14) * largest)
+        moving = moving & (change > splat(1e-13) * largest)
         if not any_lane(moving):
             break
     return moving
+
+
+@kernel
+def _put_back(tape, s, skip, worlds):
+    """Guess rows of ``worlds`` back to the multipliers at hand."""
+    at = tape[H_CONTACTS]
+    for index in range(tape[at]):
+        contact = at + 1 + CONTACT * index
+        if skip[tape[contact + 20]] == 0:
+            for axis in range(3):
+                guess = tape[H_GUESS] + tape[contact + 19] + axis
+                old = load(s, tape[contact + 23] + axis)
+                store(s, guess, select(worlds, old, load(s, guess)))
 
 
 @kernel
@@ -195,7 +207,7 @@ def solve_contacts(tape, s, skip, velocity):
         contact = at + 1 + CONTACT * index
         if skip[tape[contact + 20]] == 0:
             right = tape[H_RIGHT] + tape[contact + 19]
-            a, b, c = _relative(tape, s, skip, k, tape[H_GUESS])
+            a, b, c = relative_motion(tape, s, skip, k, tape[H_GUESS])
             store(s, right, load(s, right) + a)
             store(s, right + 1, load(s, right + 1) + b)
             store(s, right + 2, load(s, right + 2) + c)
@@ -207,14 +219,13 @@ def solve_contacts(tape, s, skip, velocity):
     bad = _violated(tape, s, skip, velocity)
     stuck = zero > zero
     if any_lane(bad):
-        for index in range(tape[at]):
-            contact = at + 1 + CONTACT * index
-            if skip[tape[contact + 20]] == 0:
-                for axis in range(3):
-                    guess = tape[H_GUESS] + tape[contact + 19] + axis
-                    old = load(s, tape[contact + 23] + axis)
-                    store(s, guess, select(bad, old, load(s, guess)))
-        stuck = _sweep(tape, s, skip, velocity, bad)
+        _put_back(tape, s, skip, bad)
+        stuck = bad
+        if tape[H_DENSE] >= 0:
+            stuck = newton(tape, s, skip, velocity, bad)
+            _put_back(tape, s, skip, stuck)
+        if any_lane(stuck):
+            stuck = _sweep(tape, s, skip, velocity, stuck)
     for index in range(tape[at]):
         contact = at + 1 + CONTACT * index
         if skip[tape[contact + 20]] == 0:

@@ -60,7 +60,7 @@ from ..model.tape import (
 from . import block_ldl
 from .base import Solver
 from .cone import solve_contacts
-from .gather import gather
+from .gather import clear_velocity_multipliers, gather
 
 _FREE_CHANGES = 10
 
@@ -234,7 +234,7 @@ def _contact_start(tape, s, skip, velocity):
             store(s, tape[H_MASK] + slot + 2, select(sticks, one, zero))
             for axis in range(3):
                 value = load(s, multiplier + axis)
-                value = zero if velocity else select(possible, value, zero)
+                value = select(possible, value, zero)
                 store(s, multiplier + axis, value)
                 store(s, tape[H_GUESS] + slot + axis, value)
 
@@ -256,14 +256,6 @@ def _link_start(tape, s, velocity):
                     closed = closed | (load(s, tape[link + 14] + 1) > splat(0.5))
                 taut = select(closed, one, zero)
             store(s, tape[H_MASK] + slot, taut)
-        if velocity:
-            store(s, tape[link + 14] + 2, zero)
-    if velocity:
-        at = tape[H_RIDERS] + 1
-        for _ in range(tape[tape[H_RIDERS]]):
-            for axis in range(3):
-                store(s, rider_multiplier(tape, at, True) + axis, zero)
-            at += HEAD + DECK * tape[at + 6]
 
 
 @kernel
@@ -382,6 +374,8 @@ def solve_stage(tape, s, skip, velocity, dt, target):
     ``target`` starts from the free rows; the stored gradients, frames and weights direct the impulses.
     """
     zero = splat(0.0)
+    if velocity:
+        clear_velocity_multipliers(tape, s)
     _link_start(tape, s, velocity)
     gather(tape, s, skip, velocity, target)
     _contact_start(tape, s, skip, velocity)

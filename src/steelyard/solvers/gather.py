@@ -2,12 +2,40 @@
 
 from __future__ import annotations
 
-from ..constraints.contacts import contact_impulses
-from ..constraints.links import link_impulses
-from ..constraints.riders import rider_impulses
+from ..constraints.contacts import contact_impulses, contact_multiplier
+from ..constraints.links import link_impulses, link_multiplier
+from ..constraints.riders import DECK, HEAD, rider_impulses, rider_multiplier
 from ..kernel import kernel
 from ..math.lanes import fma, load, splat, store
-from ..model.tape import H_FREE, H_IMPULSE, H_INVERSE_MASS, H_PARTICLES
+from ..model.tape import (
+    CONTACT,
+    H_CONTACTS,
+    H_FREE,
+    H_IMPULSE,
+    H_INVERSE_MASS,
+    H_LINKS,
+    H_PARTICLES,
+    H_RIDERS,
+    LINK,
+)
+
+
+@kernel
+def clear_velocity_multipliers(tape, s):
+    """The velocity stage starts from no impulse."""
+    zero = splat(0.0)
+    at = tape[H_LINKS]
+    for index in range(tape[at]):
+        store(s, link_multiplier(tape, at + 1 + LINK * index, True), zero)
+    at = tape[H_RIDERS] + 1
+    for _ in range(tape[tape[H_RIDERS]]):
+        for axis in range(3):
+            store(s, rider_multiplier(tape, at, True) + axis, zero)
+        at += HEAD + DECK * tape[at + 6]
+    at = tape[H_CONTACTS]
+    for index in range(tape[at]):
+        for axis in range(3):
+            store(s, contact_multiplier(tape, at + 1 + CONTACT * index, True) + axis, zero)
 
 
 @kernel

@@ -26,7 +26,7 @@ from ..model.tape import (
     LINK,
 )
 from .base import Solver
-from .gather import gather
+from .gather import clear_velocity_multipliers, gather
 
 
 @dataclass(frozen=True)
@@ -177,28 +177,10 @@ def _sweep_contacts(tape, s, skip, velocity):
 
 
 @kernel
-def _clear(tape, s):
-    """Velocity stage: all multipliers start from none."""
-    zero = splat(0.0)
-    at = tape[H_LINKS]
-    for index in range(tape[at]):
-        store(s, link_multiplier(tape, at + 1 + LINK * index, True), zero)
-    at = tape[H_RIDERS] + 1
-    for _ in range(tape[tape[H_RIDERS]]):
-        for axis in range(3):
-            store(s, rider_multiplier(tape, at, True) + axis, zero)
-        at += HEAD + DECK * tape[at + 6]
-    at = tape[H_CONTACTS]
-    for index in range(tape[at]):
-        for axis in range(3):
-            store(s, contact_multiplier(tape, at + 1 + CONTACT * index, True) + axis, zero)
-
-
-@kernel
 def sweep_stage(tape, s, skip, velocity, target):
     """One stage by sweeps; contract of ``direct.solve_stage``."""
     if velocity:
-        _clear(tape, s)
+        clear_velocity_multipliers(tape, s)
     gather(tape, s, skip, velocity, target)
     for _ in range(tape[H_PASSES]):
         _sweep_links(tape, s, velocity)

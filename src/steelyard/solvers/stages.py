@@ -15,12 +15,15 @@ from .gauss_seidel import sweep_stage
 
 @kernel
 def begin_step(tape, s, skip, dt):
-    """At the start of a step: gradients, contact frames, targets of the velocity stage."""
+    """At the start of a step: gradients, contact frames, targets of the velocity stage.
+
+    Returns whether the last velocity stage's factor no longer fits.
+    """
     link_gradients(tape, s)
     link_targets(tape, s)
     rider_coefficients(tape, s)
     contact_geometry(tape, s)
-    contact_targets(tape, s, dt, skip)
+    return contact_targets(tape, s, dt, skip)
 
 
 @kernel

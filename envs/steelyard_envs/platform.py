@@ -1,0 +1,316 @@
+"""Platform: keep a deck on two feet level by moving a load over it."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, ClassVar
+
+import numpy as np
+
+import steelyard as sy
+from steelyard_envs.single import TaskEnv
+from steelyard_envs.task import PHYSICS_ERROR, SUCCESS, TERMINATED, TRUNCATED, Array, Task
+from steelyard_envs.vector import TaskVectorEnv
+
+LENGTH, WIDTH, LEFT = 7.0, 2.0, -3.0
+SPEED, ACCELERATION = 2.0, 4.0
+FALLEN = math.sin(math.radians(25.0))
+EPISODE = 500
+LOAD, DECK_MASS = 10.0, 4.0
+
+# Rows of ``values``.
+_ALONG, _ACROSS, _SPEED_X, _SPEED_Z, _ELAPSED, _NEXT_PUSH = range(6)
+# Entries of ``settings`` and ``layout``.
+_DT, _LIMIT, _TILT, _PUSH, _PUSH_PAUSE = range(5)
+_POSITION, _VELOCITY, _WEIGHTS, _RATES, _ACCELERATIONS, _NONFINITE = range(6)
+
+
+@sy.kernel
+def _begin(mask, values, streams, settings, layout, state):
+    """Tilt a fresh platform about its feet and put the load near the balance."""
+    for w in range(mask.shape[0]):
+        if not mask[w]:
+            continue
+        tilt = sy.uniform_between(streams, w, -1.0, 1.0) * settings[_TILT]
+        along = 0.4 + 0.02 * sy.uniform_between(streams, w, -1.0, 1.0)
+        across = 0.5 + 0.1 * sy.uniform_between(streams, w, -1.0, 1.0)
+        values[_ALONG, w] = along
+        values[_ACROSS, w] = across
+        values[_SPEED_X, w] = 0.0
+        values[_SPEED_Z, w] = 0.0
+        values[_ELAPSED, w] = 0.0
+        pause = settings[_PUSH_PAUSE]
+        values[_NEXT_PUSH, w] = math.ceil(pause * sy.uniform_between(streams, w, 0.5, 1.5))
+        weights = layout[_WEIGHTS]
+        state[weights, w] = (1.0 - along) * (1.0 - across)
+        state[weights + 1, w] = (1.0 - along) * across
+        state[weights + 2, w] = along * (1.0 - across)
+        state[weights + 3, w] = along * across
+        position = layout[_POSITION]
+        for c in range(3):
+            state[position + 18 + c, w] = 0.0
+            for k in range(4):
+                corner = state[position + 3 * (2 + k) + c, w]
+                state[position + 18 + c, w] += state[weights + k, w] * corner
+        cosine, sine = math.cos(tilt), math.sin(tilt)
+        for p in range(7):
+            x = state[position + 3 * p, w]
+            y = state[position + 3 * p + 1, w]
+            state[position + 3 * p, w] = cosine * x - sine * y
+            state[position + 3 * p + 1, w] = sine * x + cosine * y
+
+
+@sy.kernel
+def _towards(speed, wanted, change):
+    """``speed`` moved to ``wanted`` by at most ``change``."""
+    return speed + min(max(wanted - speed, -change), change)
+
+
+@sy.kernel
+def _move(action, values, w, axis, dt, size):
+    """Speed up towards the commanded speed and move at constant acceleration; stop at the deck's edge."""
+    wanted = SPEED * min(max(action, -1.0), 1.0) if action == action else 0.0
+    old = values[_SPEED_X + axis, w]
+    speed = _towards(old, wanted, ACCELERATION * dt)
+    place = values[_ALONG + axis, w] + 0.5 * (old + speed) * dt / size
+    if place < 0.0 or place > 1.0:
+        place = min(max(place, 0.0), 1.0)
+        speed = 0.0
+    values[_SPEED_X + axis, w] = speed
+    values[_ALONG + axis, w] = place
+
+
+@sy.kernel
+def _control(actions, values, streams, settings, layout, state):
+    """Move the load as commanded and push the deck when it is time."""
+    dt = settings[_DT]
+    weights = layout[_WEIGHTS]
+    rates = layout[_RATES]
+    velocity = layout[_VELOCITY]
+    accelerations = layout[_ACCELERATIONS]
+    half = 0.5 * dt * dt
+    for w in range(actions.shape[0]):
+        u0, v0 = values[_ALONG, w], values[_ACROSS, w]
+        du, dv = values[_SPEED_X, w] / LENGTH, values[_SPEED_Z, w] / WIDTH
+        _move(actions[w, 0], values, w, 0, dt, LENGTH)
+        _move(actions[w, 1], values, w, 1, dt, WIDTH)
+        u1, v1 = values[_ALONG, w], values[_ACROSS, w]
+        rate00 = -du * (1.0 - v0) - (1.0 - u0) * dv
+        rate01 = -du * v0 + (1.0 - u0) * dv
+        rate10 = du * (1.0 - v0) - u0 * dv
+        rate11 = du * v0 + u0 * dv
+        state[rates, w] = rate00
+        state[rates + 1, w] = rate01
+        state[rates + 2, w] = rate10
+        state[rates + 3, w] = rate11
+        to00 = (1.0 - u1) * (1.0 - v1) - state[weights, w]
+        to01 = (1.0 - u1) * v1 - state[weights + 1, w]
+        to10 = u1 * (1.0 - v1) - state[weights + 2, w]
+        to11 = u1 * v1 - state[weights + 3, w]
+        state[accelerations, w] = (to00 - rate00 * dt) / half
+        state[accelerations + 1, w] = (to01 - rate01 * dt) / half
+        state[accelerations + 2, w] = (to10 - rate10 * dt) / half
+        state[accelerations + 3, w] = (to11 - rate11 * dt) / half
+        if values[_ELAPSED, w] >= values[_NEXT_PUSH, w]:
+            pause = settings[_PUSH_PAUSE]
+            values[_NEXT_PUSH, w] += math.ceil(pause * sy.uniform_between(streams, w, 0.5, 1.5))
+            angle = 2.0 * math.pi * sy.uniform(streams, w)
+            kick = settings[_PUSH] * sy.uniform(streams, w) / (LOAD + DECK_MASS)
+            for p in range(2, 7):
+                state[velocity + 3 * p, w] += kick * math.cos(angle)
+                state[velocity + 3 * p + 2, w] += kick * math.sin(angle)
+
+
+@sy.kernel
+def _clip(value, low, high):
+    """``value`` within bounds, 0 if it is not a number."""
+    return min(max(value, low), high) if value == value else 0.0
+
+
+@sy.kernel
+def _observe(mask, values, layout, state, observations):
+    """Observations of the worlds of ``mask``."""
+    position = layout[_POSITION]
+    velocity = layout[_VELOCITY]
+    for w in range(mask.shape[0]):
+        if not mask[w]:
+            continue
+        x = position + 6
+        v = velocity + 6
+        # Corners are left back, left front, right back, right front.
+        left = state[x + 1, w] + state[x + 4, w]
+        right = state[x + 7, w] + state[x + 10, w]
+        back = state[x + 1, w] + state[x + 7, w]
+        front = state[x + 4, w] + state[x + 10, w]
+        rise = state[v + 7, w] + state[v + 10, w] - state[v + 1, w] - state[v + 4, w]
+        lean = state[v + 4, w] + state[v + 10, w] - state[v + 1, w] - state[v + 7, w]
+        turn = state[x + 8, w] + state[x + 11, w] - state[x + 2, w] - state[x + 5, w]
+        observations[w, 0] = LEFT + LENGTH * values[_ALONG, w]
+        observations[w, 1] = WIDTH * (values[_ACROSS, w] - 0.5)
+        observations[w, 2] = values[_SPEED_X, w]
+        observations[w, 3] = values[_SPEED_Z, w]
+        observations[w, 4] = _clip((right - left) / (2.0 * LENGTH), -1.0, 1.0)
+        observations[w, 5] = _clip((front - back) / (2.0 * WIDTH), -1.0, 1.0)
+        observations[w, 6] = _clip(rise / (2.0 * LENGTH), -10.0, 10.0)
+        observations[w, 7] = _clip(lean / (2.0 * WIDTH), -10.0, 10.0)
+        observations[w, 8] = _clip(turn / (2.0 * LENGTH), -1.0, 1.0)
+        for foot in range(2):
+            observations[w, 9 + foot] = _clip(state[position + 3 * foot + 1, w], -1.0, 5.0)
+        for axis in range(2):
+            a = state[position + 2 * axis, w]
+            b = state[position + 3 + 2 * axis, w]
+            observations[w, 11 + axis] = _clip(0.5 * (a + b), -5.0, 5.0)
+
+
+@sy.kernel
+def _judge(actions, values, settings, layout, state, observations, rewards, flags):
+    """Rewards and flags after a step; the number of episodes that ended."""
+    ended = 0
+    for w in range(actions.shape[0]):
+        values[_ELAPSED, w] += 1.0
+        broken = state[layout[_NONFINITE], w] > 0.0
+        pitch = np.float64(observations[w, 4])
+        roll = np.float64(observations[w, 5])
+        fallen = broken or abs(pitch) > FALLEN or abs(roll) > FALLEN
+        square = (pitch * pitch + roll * roll) / 0.01
+        speed = values[_SPEED_X, w] ** 2 + values[_SPEED_Z, w] ** 2
+        level = 0.0 if broken else 1.0 / (1.0 + square)
+        effort = -0.1 * speed / (SPEED * SPEED)
+        fall = -10.0 if fallen else 0.0
+        rewards[1, w] = level
+        rewards[2, w] = effort
+        rewards[3, w] = fall
+        rewards[0, w] = level + effort + fall
+        elapsed = values[_ELAPSED, w]
+        late = settings[_LIMIT] > 0.0 and elapsed >= settings[_LIMIT]
+        flags[TERMINATED, w] = fallen
+        flags[TRUNCATED, w] = late
+        flags[SUCCESS, w] = elapsed >= EPISODE and not fallen
+        flags[PHYSICS_ERROR, w] = broken
+        if fallen or late:
+            ended += 1
+    return ended
+
+
+@sy.kernel
+def _step(
+    actions, everyone, values, streams, settings, layout, observations, rewards, flags,
+    tape, s, skip, ends, work, state, given, given_rows, substeps,
+):  # fmt: skip
+    """A control step of all worlds: control, physics, observation, reward."""
+    count = actions.shape[0]
+    _control(actions, values, streams, settings, layout, state)
+    blocks = (count + 7) // 8
+    sy.advance(
+        tape, s, skip, ends, work, state, given, given_rows, 0, blocks, count, substeps, 3
+    )  # fmt: skip
+    _observe(everyone, values, layout, state, observations)
+    return _judge(actions, values, settings, layout, state, observations, rewards, flags)
+
+
+class PlatformTask(Task):
+    """Scene and kernels of Platform; see ``PlatformEnv``."""
+
+    observation_table: ClassVar = (
+        ("place of the load along the deck", -3.0, 4.0, "m"),
+        ("place of the load across the deck", -1.0, 1.0, "m"),
+        ("speed of the load along the deck", -2.0, 2.0, "m/s"),
+        ("speed of the load across the deck", -2.0, 2.0, "m/s"),
+        ("pitch: sine of the deck's slope along", -1.0, 1.0, ""),
+        ("roll: sine of the deck's slope across", -1.0, 1.0, ""),
+        ("rate of the pitch", -10.0, 10.0, "1/s"),
+        ("rate of the roll", -10.0, 10.0, "1/s"),
+        ("yaw: sine of the deck's turn", -1.0, 1.0, ""),
+        ("height of the foot at z = 1", -1.0, 5.0, "m"),
+        ("height of the foot at z = -1", -1.0, 5.0, "m"),
+        ("place of the feet along x", -5.0, 5.0, "m"),
+        ("place of the feet along z", -5.0, 5.0, "m"),
+    )
+    action_table: ClassVar = ("speed of the load along", "speed of the load across")
+    terms: ClassVar = ("level", "effort", "fall")
+    methods: ClassVar = ("rattle", "symplectic_euler", "gauss_seidel")
+    default_physics_rate: ClassVar = 50.0
+    value_rows: ClassVar = 6
+
+    def build(self) -> sy.World:
+        """Seven particles: feet, corners, load."""
+        integrator = sy.SymplecticEuler() if self.method == "symplectic_euler" else sy.Rattle()
+        solver = (
+            sy.GaussSeidel(passes=30)
+            if self.method == "gauss_seidel"
+            else sy.Direct(tolerance=1e-8)
+        )
+        method = sy.Method(integrator, solver, dt=1.0 / self.physics_rate)
+        scene = sy.scenes.platform(load=LOAD)
+        self._rider = scene.of(sy.Rider)[0]
+        self._everyone = np.ones(self.num_envs, dtype=np.bool_)
+        return sy.World(scene, worlds=self.num_envs, method=method)
+
+    def level_settings(self) -> tuple[float, ...]:
+        """Start tilt [rad], impulse of a push [N s], mean pause between pushes [control steps]."""
+        tilt, push = ((0.03, 0.0), (0.07, 15.0), (0.12, 40.0))[self.difficulty - 1]
+        return tilt, push, 1.5 * self.control_rate
+
+    def rows(self) -> tuple[int, ...]:
+        """Rows of the state that the kernels touch."""
+        row = self.world.row
+        return (
+            row("particles", "position"),
+            row("particles", "velocity"),
+            row(self._rider, "weights"),
+            row(self._rider, "rates"),
+            row(self._rider, "accelerations"),
+            row("particles", "nonfinite"),
+        )
+
+    def start(self, mask: Array) -> None:
+        """A fresh platform, tilted."""
+        self.world.reset(mask)
+        _begin(mask, self.values, self.streams, self.settings, self.layout, self.world.state)
+        _observe(mask, self.values, self.layout, self.world.state, self.observations)
+
+    def step(self, actions: Array) -> int:
+        """One control step of all worlds."""
+        ended: int = _step(
+            actions, self._everyone, self.values, self.streams, self.settings, self.layout,
+            self.observations, self.rewards, self.flags, *self.world.launch, self.substeps,
+        )  # fmt: skip
+        return ended
+
+    @property
+    def camera(self) -> dict[str, Any]:
+        """From the front, a little to the side and above."""
+        return {
+            "target": (0.5, 1.5, 0.0), "distance": 11.0, "azimuth": 22.0, "elevation": 14.0,
+            "field_of_view": 50.0,
+        }  # fmt: skip
+
+    def drawing(self, index: int) -> sy.draw.Drawing:
+        """Deck, struts, feet, load and a panel."""
+        drawing = sy.draw.Drawing()
+        position = self.world.particles.position[index]
+        feet, corners, load = position[:2], position[2:6], position[6]
+        for foot in feet:
+            for corner in corners:
+                drawing.line(foot, corner, width=0.06)
+            drawing.circle(foot, 0.12)
+        drawing.line(feet[0], feet[1], width=0.06)
+        drawing.face(corners[[0, 1, 3, 2]], thickness=0.12)
+        drawing.circle(load + (0.0, 0.35, 0.0), 0.3, color=(214, 92, 58))
+        observation = self.observations[index]
+        drawing.text("pitch", f"{math.degrees(math.asin(observation[4])):+.1f} deg")
+        drawing.text("roll", f"{math.degrees(math.asin(observation[5])):+.1f} deg")
+        drawing.text("time", f"{self.values[_ELAPSED, index] / self.control_rate:.2f} s")
+        return drawing
+
+
+class PlatformEnv(TaskEnv):
+    """Platform."""
+
+    task_class = PlatformTask
+
+
+class PlatformVectorEnv(TaskVectorEnv):
+    """Platform, many at once; see ``PlatformEnv``."""
+
+    task_class = PlatformTask

@@ -1,0 +1,177 @@
+"""Newton's method on Coulomb's law, for the few contacts of one world.
+
+Alart & Curnier (1991): with u = W l - b and per-contact scales r_n, r_t, the law is the fixed point
+
+    l_n = max(0, l_n - r_n u_n),    l_t = projection of (l_t - r_t u_t) on the disc of radius mu l_n,
+
+a piecewise smooth equation. Each contact is open, sticks or slides at the present guess; that choice gives
+three rows of a dense system, solved by elimination. A little on the diagonal gives redundant friction a
+pivot, so that it stays as it is. Converges in a few iterations from the last step's impulses; where it does not, sweeps follow.
+"""
+
+from __future__ import annotations
+
+from ..kernel import kernel
+from ..math.lanes import absolute, any_lane, fma, load, select, splat, sqrt, store
+from ..model.tape import CONTACT, H_CONTACT_PRODUCTS, H_CONTACTS, H_DENSE, H_GUESS, H_RIGHT
+from .cone_rows import add_motion_row, relative_motion
+
+_ITERATIONS = 15
+_SOFTNESS = 1e-7
+_SETTLED = 1e-12
+
+
+@kernel
+def _scales(s, w):
+    """r_n and r_t: inverses of the contact's own stiffness of motion."""
+    zero = splat(0.0)
+    one = splat(1.0)
+    w00 = load(s, w)
+    w11 = load(s, w + 2)
+    w22 = load(s, w + 5)
+    size = select(w11 > w22, w11, w22) + absolute(load(s, w + 4))
+    normal = select(w00 > zero, one / w00, zero)
+    return normal, select(size > zero, one / size, zero)
+
+
+@kernel
+def _contact_system(tape, s, skip, contact, k, velocity, first, width):
+    """Three rows of the system for one contact; its error and the size of its impulse."""
+    zero = splat(0.0)
+    one = splat(1.0)
+    half = splat(0.5)
+    slot = tape[contact + 19]
+    guess = tape[H_GUESS] + slot
+    right = tape[H_RIGHT] + slot
+    row = tape[H_DENSE] + (slot - first) * width
+    last = width - 1
+    for entry in range(3 * width):
+        store(s, row + entry, zero)
+    a, b, c = relative_motion(tape, s, skip, k, tape[H_GUESS])
+    un = a - load(s, right)
+    ut = b - load(s, right + 1)
+    uu = c - load(s, right + 2)
+    n = load(s, guess)
+    t = load(s, guess + 1)
+    u = load(s, guess + 2)
+    rn, rt = _scales(s, tape[k + 1])
+    possible = load(s, tape[contact + 18]) > half
+    loads = n - rn * un > zero
+    if velocity:
+        loads = loads | (load(s, tape[contact + 18] + 3) > half)
+    closed = select(possible & loads, one, zero)
+    open_ = one - closed
+    # Normal: u_n = 0 where closed, l_n = 0 where open.
+    own = row + slot - first
+    add_motion_row(tape, s, skip, k, 0, row, closed * rn, first)
+    store(s, own, load(s, own) + open_)
+    normal_error = select(closed > half, rn * un, n)
+    store(s, row + last, zero - normal_error)
+    # Tangents: where they slide, l_t = mu l_n e with e the direction of l_t - r_t u_t.
+    pt = t - rt * ut
+    pu = u - rt * uu
+    length = sqrt(fma(pu, pu, pt * pt))
+    friction = load(s, tape[contact + 14])
+    bound = friction * select(n > zero, n, zero)
+    slides = (length > bound) & (closed > half)
+    safe = select(length > zero, length, one)
+    et = pt / safe
+    eu = pu / safe
+    share = select(slides, bound / safe, closed)
+    p00 = select(slides, one - et * et, one)
+    p01 = select(slides, zero - et * eu, zero)
+    p11 = select(slides, one - eu * eu, one)
+    k00 = share * p00
+    k01 = share * p01
+    k11 = share * p11
+    soft = splat(1.0 + _SOFTNESS)
+    next_ = row + width
+    other = next_ + width
+    add_motion_row(tape, s, skip, k, 1, next_, rt * k00, first)
+    add_motion_row(tape, s, skip, k, 2, next_, rt * k01, first)
+    add_motion_row(tape, s, skip, k, 1, other, rt * k01, first)
+    add_motion_row(tape, s, skip, k, 2, other, rt * k11, first)
+    own = next_ + slot - first
+    store(s, own + 1, load(s, own + 1) + soft - k00)
+    store(s, own + 2, load(s, own + 2) - k01)
+    store(s, own, load(s, own) - select(slides, friction * et, zero))
+    own = other + slot - first
+    store(s, own + 1, load(s, own + 1) - k01)
+    store(s, own + 2, load(s, own + 2) + soft - k11)
+    store(s, own, load(s, own) - select(slides, friction * eu, zero))
+    sticks = closed > half
+    error_t = select(slides, t - bound * et, select(sticks, rt * ut, t))
+    error_u = select(slides, u - bound * eu, select(sticks, rt * uu, u))
+    store(s, next_ + last, zero - error_t)
+    store(s, other + last, zero - error_u)
+    error = absolute(normal_error) + absolute(error_t) + absolute(error_u)
+    return error, absolute(n) + absolute(t) + absolute(u)
+
+
+@kernel
+def _eliminate(s, dense, size):
+    """Solve the dense system in place, last column the right side."""
+    zero = splat(0.0)
+    one = splat(1.0)
+    width = size + 1
+    for k in range(size):
+        row = dense + k * width
+        pivot = load(s, row + k)
+        good = absolute(pivot) > zero
+        inverse = select(good, one / select(good, pivot, one), zero)
+        for column in range(k + 1, width):
+            store(s, row + column, load(s, row + column) * inverse)
+        for below in range(k + 1, size):
+            at = dense + below * width
+            factor = zero - load(s, at + k)
+            for column in range(k + 1, width):
+                value = fma(factor, load(s, row + column), load(s, at + column))
+                store(s, at + column, value)
+    for k in range(size - 1, -1, -1):
+        row = dense + k * width
+        value = load(s, row + size)
+        for column in range(k + 1, size):
+            value = fma(zero - load(s, row + column), load(s, dense + column * width + size), value)
+        store(s, row + size, value)
+
+
+@kernel
+def newton(tape, s, skip, velocity, worlds):
+    """Improve the guess rows of ``worlds``; the worlds that still miss the law afterwards."""
+    zero = splat(0.0)
+    one = splat(1.0)
+    at = tape[H_CONTACTS]
+    count = tape[at]
+    first = tape[at + 1 + 19]
+    size = 3 * count
+    width = size + 1
+    moving = worlds
+    for turn in range(_ITERATIONS + 1):
+        error = zero
+        largest = splat(1e-300)
+        k = tape[H_CONTACT_PRODUCTS] + 1
+        for index in range(count):
+            contact = at + 1 + CONTACT * index
+            if skip[tape[contact + 20]] == 0:
+                wrong, extent = _contact_system(tape, s, skip, contact, k, velocity, first, width)
+                error = error + wrong
+                largest = select(extent > largest, extent, largest)
+            else:
+                row = tape[H_DENSE] + 3 * index * width
+                for entry in range(3 * width):
+                    store(s, row + entry, zero)
+                for axis in range(3):
+                    store(s, row + axis * width + 3 * index + axis, one)
+            k += 4 + 4 * tape[k + 3]
+        moving = moving & (error > splat(_SETTLED) * largest)
+        if turn == _ITERATIONS or not any_lane(moving):
+            break
+        _eliminate(s, tape[H_DENSE], size)
+        for index in range(count):
+            contact = at + 1 + CONTACT * index
+            if skip[tape[contact + 20]] == 0:
+                for axis in range(3):
+                    guess = tape[H_GUESS] + tape[contact + 19] + axis
+                    change = load(s, tape[H_DENSE] + (3 * index + axis) * width + size)
+                    store(s, guess, load(s, guess) + select(moving, change, zero))
+    return moving

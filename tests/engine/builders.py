@@ -1,0 +1,73 @@
+"""Scenes of the benchmarks and of the reference solver as scenes of the engine."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+import steelyard as sy
+from benchmarks.scenes import ParticleScene
+from tests.reference_solver import DenseScene
+
+Array = npt.NDArray[np.float64]
+
+
+def from_particle_scene(source: ParticleScene, *, cable_restitution: float = 0.0) -> sy.Scene:
+    """Particles, then rods, cables and supports, each in the order of the source."""
+    scene = sy.Scene(gravity=source.gravity)
+    particles = [
+        scene.add(sy.Particle(position=x, velocity=v, mass=m, damping=source.damping))
+        for x, v, m in zip(source.position, source.velocity, source.mass.tolist(), strict=True)
+    ]
+    for a, b, length in source.rods:
+        scene.add(sy.Rod(particles[a], particles[b], length))
+    for a, b, length in source.cables:
+        scene.add(sy.Cable(particles[a], particles[b], length, restitution=cable_restitution))
+    for p, anchor, length in source.supports:
+        scene.add(
+            sy.CableConstraint(particles[p], anchor, length, restitution=cable_restitution)
+        )
+    return scene
+
+
+def from_dense_scene(source: DenseScene) -> sy.Scene:
+    """Particles, then links in the order of the source."""
+    scene = sy.Scene(gravity=(0.0, 0.0, 0.0))
+    particles = [
+        scene.add(
+            sy.Particle(
+                position=x, velocity=v, inverse_mass=w, acceleration=a, damping=source.damping
+            )
+        )
+        for x, v, w, a in zip(
+            source.position,
+            source.velocity,
+            source.inverse_mass.tolist(),
+            source.acceleration,
+            strict=True,
+        )
+    ]
+    for link in source.links:
+        rod = link.kind == "rod"
+        if isinstance(link.b, int):
+            ends = particles[link.a], particles[link.b]
+            scene.add(sy.Rod(*ends, link.length) if rod else sy.Cable(*ends, link.length))
+        else:
+            kind = sy.RodConstraint if rod else sy.CableConstraint
+            scene.add(kind(particles[link.a], link.b, link.length))
+    return scene
+
+
+def advance(world: sy.World, steps: int) -> tuple[Array, Array]:
+    """Positions [m] and velocities [m/s] at the start and after each step.
+
+    Returns:
+        Two arrays of shape (steps + 1, worlds, particles, 3).
+    """
+    position = [world.particles.position.copy()]
+    velocity = [world.particles.velocity.copy()]
+    for _ in range(steps):
+        world.step()
+        position.append(world.particles.position.copy())
+        velocity.append(world.particles.velocity.copy())
+    return np.array(position), np.array(velocity)
