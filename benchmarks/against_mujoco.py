@@ -14,107 +14,19 @@ links.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import steelyard as sy
-from benchmarks import cases, record
-from benchmarks.cases import Case, distance
+from benchmarks import record
+from benchmarks.cases import ROUNDING, distance
+from benchmarks.contests import CONTESTS, DT, LINKED, PEERS_LINKED, WORLDS, Contest
 from benchmarks.figures import Announce, Figure
 from benchmarks.flights import EngineFlight, Flight, PeerFlight, PeerMethod
 from benchmarks.rest import settle
 from benchmarks.work_precision import Point, draw
 
 STAGES = ("platform", "bridge", "ballistic", "bridge at rest")
-WORLDS = 1024
-#: The step at which the targets compare [s].
-DT = 0.01
-
-Methods = dict[str, Callable[[float], sy.Method]]
-LINKED: Methods = {
-    "Rattle, Direct": lambda dt: sy.Method(sy.Rattle(), sy.Direct(), dt=dt),
-    "Rattle, Direct to 1e-6": lambda dt: sy.Method(sy.Rattle(), sy.Direct(tolerance=1e-6), dt=dt),
-    "Rattle, Gauss-Seidel x 4": lambda dt: sy.Method(sy.Rattle(), sy.GaussSeidel(passes=4), dt=dt),
-}
-FREE: Methods = {
-    "closed form": lambda dt: sy.Method(sy.ClosedForm(), dt=dt),
-    "Rattle": lambda dt: sy.Method(sy.Rattle(), dt=dt),
-}
-PEERS_LINKED = {
-    f"MuJoCo {integrator}, {links} links": PeerMethod(integrator=integrator, links=links)
-    for integrator in ("Euler", "RK4")
-    for links in ("default", "safe", "tight")
-}
-PEERS_FREE = {
-    "MuJoCo Euler": PeerMethod(integrator="Euler"),
-    "MuJoCo RK4": PeerMethod(integrator="RK4"),
-}
-
-
-@dataclass(frozen=True, kw_only=True)
-class Contest:
-    """What is run on a case.
-
-    Attributes:
-        case: The motion, given the number of worlds.
-        methods: Our methods, given dt, by name; the first is the default one.
-        peers: MuJoCo's settings by name; the first is its default one.
-        steps: Our ladder, in steps per stretch.
-        peer_steps: MuJoCo's.
-        limit_steps: Steps per stretch of MuJoCo's own motion at small steps; None where its links
-            are not soft.
-        crowd: Worlds side by side in one model of MuJoCo, where it was found to be fastest.
-        target: Smallest ratio of costs to be reached.
-        at_equal_step: Whether the target compares both at `DT`, instead of our cheapest point of no
-            larger error. For a method that is exact at any step this is the harder comparison.
-    """
-
-    case: Callable[[int], Case]
-    methods: Methods
-    peers: Mapping[str, PeerMethod]
-    steps: Sequence[int]
-    peer_steps: Sequence[int]
-    limit_steps: int | None
-    crowd: int
-    target: float
-    at_equal_step: bool = False
-
-
-CONTESTS = {
-    "platform": Contest(
-        case=cases.platform,
-        methods=LINKED,
-        peers=PEERS_LINKED,
-        steps=(10, 12, 14, 17, 20, 25, 35, 50, 100, 200, 250),
-        peer_steps=(25, 50, 100, 200),
-        limit_steps=1600,
-        crowd=2,
-        target=50.0,
-    ),
-    "bridge": Contest(
-        case=cases.bridge,
-        methods=LINKED,
-        peers=PEERS_LINKED,
-        steps=(1, 2, 3, 4, 8, 16),
-        peer_steps=(2, 4, 8, 16),
-        limit_steps=128,
-        crowd=16,
-        target=40.0,
-    ),
-    "ballistic": Contest(
-        case=cases.ballistic,
-        methods=FREE,
-        peers=PEERS_FREE,
-        steps=(1, 10, 100),
-        peer_steps=(1, 10, 100),
-        limit_steps=None,
-        crowd=1024,
-        target=100.0,
-        at_equal_step=True,
-    ),
-}
 
 
 def run(*, quick: bool, output: Path, announce: Announce) -> list[Figure]:
@@ -187,15 +99,14 @@ def measure(contest: Contest, *, quick: bool) -> list[Point]:
         ("one world", 1, False),
         ("one world, step by step", 1, True),
     ):
-        flight = EngineFlight(case, method(dt), worlds=count, step_by_step=by_step)
-        flights[name, dt, mode] = flight
+        flights[name, dt, mode] = EngineFlight(case, method(dt), worlds=count, step_by_step=by_step)
     name, peer = next(iter(contest.peers.items()))
     stepped = PeerFlight(case, peer, dt=dt, rounds=rounds, step_by_step=True)
     flights[name, dt, "step by step"] = stepped
     flights[name, dt, "side by side"] = PeerFlight(case, peer, dt=dt, copies=contest.crowd)
 
     trajectories = {key: flight.trajectory() for key, flight in flights.items()}
-    soft = None
+    soft = case.solution
     if contest.limit_steps is not None:
         limit = equal * 4 if quick else contest.limit_steps
         finest = PeerFlight(case, PeerMethod(integrator="RK4"), dt=case.stretch / limit)
@@ -208,7 +119,7 @@ def measure(contest: Contest, *, quick: bool) -> list[Point]:
         position, velocity = trajectories[name, dt, mode]
         peer_method = contest.peers.get(name)
         # Other links follow the step: the limit of their motion is the solution itself.
-        softest = peer_method is not None and peer_method.links == "default" and soft is not None
+        stays_soft = peer_method is not None and peer_method.links == "default"
         points.append(
             Point(
                 method=name,
@@ -216,7 +127,7 @@ def measure(contest: Contest, *, quick: bool) -> list[Point]:
                 mode=mode,
                 score=case.score(position, velocity),
                 per_second=1e6 * times[repr((name, dt, mode))] / flight.simulated,
-                own_limit=distance(position, soft if softest else case.solution),
+                own_limit=distance(position, soft if stays_soft else case.solution),
                 peer=peer_method is not None,
             )
         )
@@ -253,10 +164,10 @@ def summarise(
 ) -> list[Figure]:
     """The figures of a contest: each ratio at the setting where our advantage is smallest."""
     words = {
-        "per second": "per simulated second at no larger error",
-        "per second, default method": "the same by our default method",
-        "per second, own limits": "the same, errors from own small-step limits",
-        "per step": f"per step at dt {DT:g}",
+        "per second": "MuJoCo's cost over ours per simulated second, at no larger error",
+        "per second, default method": "the same, our default method",
+        "per second, own limits": "the same, errors from each engine's own small-step limit",
+        "per step": f"MuJoCo's cost over ours per step, dt {DT:g}",
     }
     judged = "per step" if contest.at_equal_step else "per second"
     figures = []
@@ -270,13 +181,13 @@ def summarise(
         figures.append(Figure(name=f"{name}: {text}", measured=least, at_least=target))
     ours, theirs = next(iter(contest.methods)), next(iter(contest.peers))
     for mode, peer_mode, text in (
-        ("batch", "side by side", f"{contest.crowd} worlds in one model of MuJoCo"),
+        ("batch", "side by side", f"{contest.crowd} worlds in each model of MuJoCo"),
         ("step by step", "step by step", "one call per step"),
         ("one world", "batch", "one world"),
         ("one world, step by step", "step by step", "one world, one call per step"),
     ):
         ratio = _at(points, theirs, peer_mode).per_step / _at(points, ours, mode).per_step
-        figures.append(Figure(name=f"{name}: per step, {text}", measured=ratio))
+        figures.append(Figure(name=f"{name}: the same per step, {text}", measured=ratio))
     return figures
 
 
@@ -299,6 +210,6 @@ def _ratio(theirs: Point, ours: Point | None) -> float | None:
 
 def _within_own_limit(ours: Point, theirs: Point) -> bool:
     return all(
-        mine <= max(other, cases.ROUNDING)
+        mine <= max(other, ROUNDING)
         for mine, other in zip(ours.own_limit, theirs.own_limit, strict=True)
     )

@@ -76,7 +76,7 @@ def taut_motion(
         return (free - weight.T @ density).reshape(count, 3), density
 
     state = np.stack([scene.position, scene.velocity])
-    visited = []
+    visited: list[Array] = []
     for mass in masses:
 
         def change(_: float, flat: Array, mass: Array = mass) -> Array:

@@ -13,7 +13,9 @@ from steelyard_envs.task import PHYSICS_ERROR, SUCCESS, TERMINATED, TRUNCATED, A
 from steelyard_envs.vector import TaskVectorEnv
 
 LENGTH, WIDTH, LEFT = 7.0, 2.0, -3.0
-SPEED, ACCELERATION = 2.0, 4.0
+# Along and across: fast across would lift a foot.
+SPEED = (3.0, 1.5)
+ACCELERATION = (8.0, 3.0)
 FALLEN = math.sin(math.radians(25.0))
 EPISODE = 500
 LOAD, DECK_MASS = 10.0, 4.0
@@ -69,9 +71,9 @@ def _towards(speed, wanted, change):
 @sy.kernel
 def _move(action, values, w, axis, dt, size):
     """Speed up towards the commanded speed and move at constant acceleration; stop at the deck's edge."""
-    wanted = SPEED * min(max(action, -1.0), 1.0) if action == action else 0.0
+    wanted = SPEED[axis] * min(max(action, -1.0), 1.0) if action == action else 0.0
     old = values[_SPEED_X + axis, w]
-    speed = _towards(old, wanted, ACCELERATION * dt)
+    speed = _towards(old, wanted, ACCELERATION[axis] * dt)
     place = values[_ALONG + axis, w] + 0.5 * (old + speed) * dt / size
     if place < 0.0 or place > 1.0:
         place = min(max(place, 0.0), 1.0)
@@ -175,7 +177,7 @@ def _judge(actions, values, settings, layout, state, observations, rewards, flag
         square = (pitch * pitch + roll * roll) / 0.01
         speed = values[_SPEED_X, w] ** 2 + values[_SPEED_Z, w] ** 2
         level = 0.0 if broken else 1.0 / (1.0 + square)
-        effort = -0.1 * speed / (SPEED * SPEED)
+        effort = -0.1 * speed / (SPEED[0] * SPEED[0])
         fall = -10.0 if fallen else 0.0
         rewards[1, w] = level
         rewards[2, w] = effort
@@ -214,8 +216,8 @@ class PlatformTask(Task):
     observation_table: ClassVar = (
         ("place of the load along the deck", -3.0, 4.0, "m"),
         ("place of the load across the deck", -1.0, 1.0, "m"),
-        ("speed of the load along the deck", -2.0, 2.0, "m/s"),
-        ("speed of the load across the deck", -2.0, 2.0, "m/s"),
+        ("speed of the load along the deck", -3.0, 3.0, "m/s"),
+        ("speed of the load across the deck", -1.5, 1.5, "m/s"),
         ("pitch: sine of the deck's slope along", -1.0, 1.0, ""),
         ("roll: sine of the deck's slope across", -1.0, 1.0, ""),
         ("rate of the pitch", -10.0, 10.0, "1/s"),
@@ -248,7 +250,7 @@ class PlatformTask(Task):
 
     def level_settings(self) -> tuple[float, ...]:
         """Start tilt [rad], impulse of a push [N s], mean pause between pushes [control steps]."""
-        tilt, push = ((0.03, 0.0), (0.07, 15.0), (0.12, 40.0))[self.difficulty - 1]
+        tilt, push = ((0.03, 0.0), (0.05, 6.0), (0.08, 10.0))[self.difficulty - 1]
         return tilt, push, 1.5 * self.control_rate
 
     def rows(self) -> tuple[int, ...]:

@@ -33,6 +33,8 @@ class TaskEnv(gym.Env[Observation, NDArray[np.float32]]):
         self.action_space = self.task.action_space()
         self._names = tuple(f"reward_{name}" for name in self.task.terms)
         self._all = np.ones(1, dtype=np.bool_)
+        # Kernels get this one array: a read-only or strided one would make numba compile them anew.
+        self._actions = np.zeros((1, *self.task.action_shape), dtype=np.float32)
         self._seeded = False
         self._renderer: Any = None
 
@@ -42,8 +44,8 @@ class TaskEnv(gym.Env[Observation, NDArray[np.float32]]):
         """Begin an episode. ``seed`` starts the world's random stream anew; without, it goes on."""
         super().reset(seed=seed)
         if seed is not None or not self._seeded:
-            chosen = self.np_random.integers(2**63) if seed is None else seed
-            self.task.seed(self._all, np.array([chosen]))
+            chosen = int(self.np_random.integers(2**63)) if seed is None else seed
+            self.task.seed(self._all, [chosen])
             self._seeded = True
         self.task.rewards[:] = 0.0
         self.task.flags[:] = False
@@ -55,9 +57,17 @@ class TaskEnv(gym.Env[Observation, NDArray[np.float32]]):
     def step(
         self, action: NDArray[np.float32]
     ) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """One control step; the physics takes ``physics_rate / control_rate`` steps."""
+        """One control step; the physics takes ``physics_rate / control_rate`` steps.
+
+        Raises:
+            ValueError: an action of another shape.
+            ResetNeeded: no episode has begun.
+        """
         task = self.task
-        task.step(np.asarray(action, dtype=np.float32).reshape(1, -1))
+        if not self._seeded or np.shape(action) != task.action_shape:
+            raise step_error(self, self._seeded, np.shape(action), task.action_shape)
+        self._actions[0] = action
+        task.step(self._actions)
         if self.render_mode == "human":
             self.render()
         return (
@@ -86,10 +96,7 @@ class TaskEnv(gym.Env[Observation, NDArray[np.float32]]):
     def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
         """A frame (height, width, 3) in mode "rgb_array"; a window in mode "human"."""
         if self.render_mode is None:
-            gym.logger.warn(
-                f"{type(self).__name__}.render: render_mode is None; make the environment with "
-                'render_mode="rgb_array" or "human".'
-            )
+            warn_of_no_mode(self)
             return None
         if self._renderer is None:
             self._renderer = make_renderer(self.task, self.render_mode)
@@ -112,6 +119,27 @@ def check_render_mode(owner: str, mode: str | None) -> None:
         raise ValueError(
             f"{owner}: render_mode is {mode!r}; it must be None, 'human' or 'rgb_array'."
         )
+
+
+def warn_of_no_mode(owner: object) -> None:
+    """Say why there is nothing to see."""
+    gym.logger.warn(
+        f"{type(owner).__name__}.render: render_mode is None; make the environment with "
+        'render_mode="rgb_array" or "human".'
+    )
+
+
+def step_error(
+    owner: object, begun: bool, given: tuple[int, ...], shape: tuple[int, ...]
+) -> Exception:
+    """What is wrong with a step: no episode has begun, or the actions have another shape."""
+    name = type(owner).__name__
+    if not begun:
+        return gym.error.ResetNeeded(f"{name}.step: no episode has begun. Call reset first.")
+    return ValueError(
+        f"{name}.step: the actions have shape {given}; it must be {shape}. "
+        "Give a number for every action."
+    )
 
 
 def make_renderer(task: Task, mode: str) -> Any:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from typing import Any, ClassVar
 
 import gymnasium as gym
@@ -27,7 +29,8 @@ class Task(ABC):
         num_envs: number of worlds.
         difficulty: level, one of ``levels``.
         method: name of the physics method, one of ``methods``; None for the default.
-        physics_rate: physics steps per second; None for the default.
+        physics_rate: physics steps per second, a whole multiple of ``control_rate``; None for the
+            default, or the next multiple above it.
         control_rate: control steps per second; None for the default.
         max_steps: control steps after which an episode is truncated; 0 leaves that to a wrapper.
 
@@ -62,13 +65,18 @@ class Task(ABC):
     ) -> None:
         name = type(self).__name__
         self.difficulty = _choice(name, "difficulty", difficulty, self.levels)
-        self.method = _choice(name, "method", method or self.methods[0], self.methods)
+        chosen = self.methods[0] if method is None else method
+        self.method = _choice(name, "method", chosen, self.methods)
         control = self.default_control_rate if control_rate is None else float(control_rate)
-        physics = (
-            max(self.default_physics_rate, control) if physics_rate is None else float(physics_rate)
-        )
+        if physics_rate is not None:
+            physics = float(physics_rate)
+        elif control > 0:
+            # The smallest multiple of the control rate that is no slower than the default.
+            physics = control * max(1, math.ceil(self.default_physics_rate / control - 1e-9))
+        else:
+            physics = self.default_physics_rate
         ratio = physics / control if control > 0 else 0.0
-        if not (control > 0 and ratio >= 1 and abs(ratio - round(ratio)) < 1e-9):
+        if not (1 <= ratio < math.inf and abs(ratio - round(ratio)) < 1e-9):
             raise ValueError(
                 f"{name}: physics_rate is {physics!r} and control_rate {control!r}; the physics rate must be a "
                 "whole multiple of a control rate above 0. Use 50 and 50, or 200 and 50."
@@ -125,10 +133,25 @@ class Task(ABC):
     def camera(self) -> dict[str, Any]:
         """Arguments of the camera."""
 
-    def seed(self, mask: Array, seeds: Array) -> None:
-        """Give worlds of ``mask`` the streams of ``seeds`` (number of them,), from their beginning."""
-        self.streams[0, mask] = seeds.astype(np.uint64)
-        self.streams[1, mask] = 0
+    def seed(self, chosen: Array | list[int], seeds: Array | Sequence[int]) -> None:
+        """Give worlds the random streams of ``seeds``, from their beginning.
+
+        Args:
+            chosen: mask (num_envs,) bool, or indices, of the worlds.
+            seeds: one for each of them, at least 0; those above 64 bits, as Gymnasium draws them,
+                count modulo 2**64.
+
+        Raises:
+            ValueError: a seed below 0.
+        """
+        if not isinstance(seeds, np.ndarray):
+            if min(seeds, default=0) < 0:
+                raise ValueError(
+                    f"{type(self).__name__}: a seed is {min(seeds)}; it must be 0 or more. Use 0."
+                )
+            seeds = np.array([int(entry) % 2**64 for entry in seeds], dtype=np.uint64)
+        self.streams[0, chosen] = seeds
+        self.streams[1, chosen] = 0
 
     def snapshot(self) -> tuple[Any, ...]:
         """Copy of the whole state: physics, task, random streams and outputs."""
@@ -142,6 +165,11 @@ class Task(ABC):
         arrays = (self.values, self.streams, self.rewards, self.flags, self.observations)
         for array, copy in zip(arrays, copies, strict=True):
             array[:] = copy
+
+    @property
+    def action_shape(self) -> tuple[int]:
+        """Shape of one world's action."""
+        return (len(self.action_table),)
 
     @classmethod
     def observation_space(cls) -> gym.spaces.Box:

@@ -10,7 +10,7 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from steelyard_envs.single import check_render_mode, make_renderer
+from steelyard_envs.single import check_render_mode, make_renderer, step_error, warn_of_no_mode
 from steelyard_envs.task import PHYSICS_ERROR, SUCCESS, TERMINATED, TRUNCATED, Task
 
 Array = NDArray[Any]
@@ -22,9 +22,10 @@ class TaskVectorEnv(gym.vector.VectorEnv[Array, Array, Array]):
     Args:
         num_envs: number of worlds, at least 1.
         max_episode_steps: control steps after which an episode is truncated; None for no limit.
-        autoreset_mode: when a finished row begins anew: NEXT_STEP, SAME_STEP (then ``final_obs`` and
-            ``final_info`` are in the info) or DISABLED (``reset(options={"reset_mask": mask})``).
-        render_mode: None, "human" (the first world) or "rgb_array" (every world).
+        autoreset_mode: when a finished row begins anew: NEXT_STEP, SAME_STEP (then ``final_obs``
+            and ``final_info`` are in the info) or DISABLED: a finished row goes on until
+            ``reset(options={"reset_mask": mask})``.
+        render_mode: None, "human" (the first world, at every step) or "rgb_array" (every world).
         **task: arguments of the task: difficulty, method, physics_rate, control_rate.
     """
 
@@ -62,7 +63,8 @@ class TaskVectorEnv(gym.vector.VectorEnv[Array, Array, Array]):
         self._names = tuple(f"reward_{term}" for term in self.task.terms)
         self._done = np.zeros(self.num_envs, dtype=np.bool_)
         self._all = np.ones(self.num_envs, dtype=np.bool_)
-        self._all.flags.writeable = False
+        # Kernels get this one array: a read-only or strided one would make numba compile them anew.
+        self._actions = np.zeros((self.num_envs, *self.task.action_shape), dtype=np.float32)
         self._seeded = False
         self._renderer: Any = None
 
@@ -77,40 +79,51 @@ class TaskVectorEnv(gym.vector.VectorEnv[Array, Array, Array]):
 
         Raises:
             ValueError: a mask or list of seeds of another shape.
+            ResetNeeded: the first reset is of some rows only.
         """
-        super().reset(seed=seed if isinstance(seed, int) else None)
+        super().reset(seed=int(seed) if isinstance(seed, int | np.integer) else None)
         mask = self._mask(options)
         self._seed(seed, mask)
         self.task.rewards[:, mask] = 0.0
         self.task.flags[:, mask] = False
         self.task.start(mask)
         self._done &= ~mask
-        return self.task.observations.copy(), self._info()
+        if self.render_mode == "human":
+            self.render()
+        return self.task.observations.copy(), self._info(mask)
 
     def _mask(self, options: dict[str, Any] | None) -> Array:
         if not options or "reset_mask" not in options:
             return self._all.copy()
-        mask = np.asarray(options["reset_mask"])
+        mask = np.array(options["reset_mask"])
         if mask.shape != (self.num_envs,) or mask.dtype != np.bool_:
             raise ValueError(
                 f"{type(self).__name__}.reset: reset_mask has shape {mask.shape} and type {mask.dtype}; it must be "
                 f"({self.num_envs},) bool. Set True for the rows to reset."
             )
+        if not (self._seeded or mask.all()):
+            raise gym.error.ResetNeeded(
+                f"{type(self).__name__}.reset: reset_mask leaves out rows in which no episode has "
+                "begun. Reset all rows first."
+            )
         return mask
 
     def _seed(self, seed: int | list[int | None] | None, mask: Array) -> None:
+        """Start the random streams of ``mask`` as ``seed`` says; at first, all of them."""
         if isinstance(seed, int | np.integer):
-            self.task.seed(self._all, np.arange(self.num_envs) + int(seed))
-        elif seed is not None:
-            if len(seed) != self.num_envs:
-                raise ValueError(
-                    f"{type(self).__name__}.reset: {len(seed)} seeds are given; there are {self.num_envs} rows. "
-                    "Give one per row, None to go on."
-                )
-            chosen = np.array([entry is not None for entry in seed]) & mask
-            self.task.seed(chosen, np.array([s for s, c in zip(seed, chosen, strict=True) if c]))
-        elif not self._seeded:
-            self.task.seed(self._all, self.np_random.integers(2**63, size=self.num_envs))
+            first = np.uint64(int(seed) % 2**64)
+            self.task.seed(mask, (np.arange(self.num_envs, dtype=np.uint64) + first)[mask])
+        elif seed is not None and len(seed) != self.num_envs:
+            raise ValueError(
+                f"{type(self).__name__}.reset: {len(seed)} seeds are given; there are {self.num_envs} rows. "
+                "Give one per row, None to go on."
+            )
+        else:
+            if not self._seeded:
+                self.task.seed(self._all, self.np_random.integers(2**63, size=self.num_envs))
+            if seed is not None:
+                pairs = [(k, s) for k, s in enumerate(seed) if mask[k] and s is not None]
+                self.task.seed([k for k, _ in pairs], [s for _, s in pairs])
         self._seeded = True
 
     def step(self, actions: Array) -> tuple[Array, Array, Array, Array, dict[str, Any]]:
@@ -118,14 +131,13 @@ class TaskVectorEnv(gym.vector.VectorEnv[Array, Array, Array]):
 
         Raises:
             ValueError: actions of another shape.
+            ResetNeeded: no episode has begun.
         """
-        given = np.ascontiguousarray(actions, dtype=np.float32)
-        if given.shape != self.action_space.shape:
-            raise ValueError(
-                f"{type(self).__name__}.step: actions have shape {given.shape}; it must be "
-                f"{self.action_space.shape}. Give one action per row."
-            )
         task = self.task
+        given = self._actions
+        if not self._seeded or np.shape(actions) != given.shape:
+            raise step_error(self, self._seeded, np.shape(actions), given.shape)
+        given[:] = actions
         again = self._done if self.autoreset_mode == AutoresetMode.NEXT_STEP else None
         if again is not None and again.any():
             streams = task.streams[:, again]
@@ -141,46 +153,43 @@ class TaskVectorEnv(gym.vector.VectorEnv[Array, Array, Array]):
         terminated = task.flags[TERMINATED].copy()
         truncated = task.flags[TRUNCATED].copy()
         reward = task.rewards[0].copy()
-        if not ended:
-            self._done[:] = False
-            return task.observations.copy(), reward, terminated, truncated, self._info()
-        done = terminated | truncated
         info: dict[str, Any] = {}
-        if self.autoreset_mode == AutoresetMode.SAME_STEP and done.any():
-            info = self._final(done)
-            task.rewards[:, done] = 0.0
-            task.flags[:, done] = False
-            task.start(done)
-        self._done = done
-        return task.observations.copy(), reward, terminated, truncated, {**self._info(), **info}
+        if ended:
+            done = self._done = terminated | truncated
+            if self.autoreset_mode == AutoresetMode.SAME_STEP and done.any():
+                info = self._final(done)
+                task.rewards[:, done] = 0.0
+                task.flags[:, done] = False
+                task.start(done)
+        else:
+            self._done[:] = False
+        if self.render_mode == "human":
+            self.render()
+        info = self._info(self._all) | info
+        return task.observations.copy(), reward, terminated, truncated, info
 
     def _final(self, done: Array) -> dict[str, Any]:
         """Last observations and infos of the finished rows, in Gymnasium's form."""
         final = np.full(self.num_envs, None, dtype=object)
         for row in np.flatnonzero(done):
             final[row] = self.task.observations[row].copy()
-        info = {
-            key: np.where(done, value, False if value.dtype == np.bool_ else 0.0)
-            for key, value in self._info().items()
-            if not key.startswith("_")
-        }
-        masks = {f"_{key}": done.copy() for key in info}
         return {
             "final_obs": final,
             "_final_obs": done.copy(),
-            "final_info": info | masks,
+            "final_info": self._info(done),
             "_final_info": done.copy(),
         }
 
-    def _info(self) -> dict[str, Any]:
+    def _info(self, rows: Array) -> dict[str, Any]:
+        """Reward terms and flags of ``rows`` (num_envs,) bool, in Gymnasium's form; others are 0."""
         task = self.task
         info: dict[str, Any] = {}
         for k, name in enumerate(self._names):
-            info[name] = task.rewards[1 + k].copy()
-            info[f"_{name}"] = self._all
+            info[name] = task.rewards[1 + k] * rows
+            info[f"_{name}"] = rows.copy()
         for name, row in (("is_success", SUCCESS), ("physics_error", PHYSICS_ERROR)):
-            info[name] = task.flags[row].copy()
-            info[f"_{name}"] = self._all
+            info[name] = task.flags[row] & rows
+            info[f"_{name}"] = rows.copy()
         return info
 
     def snapshot(self) -> tuple[Any, ...]:
@@ -195,11 +204,14 @@ class TaskVectorEnv(gym.vector.VectorEnv[Array, Array, Array]):
     def render(self) -> tuple[Any, ...] | None:
         """A frame (height, width, 3) per world in mode "rgb_array"; a window in mode "human"."""
         if self.render_mode is None:
+            warn_of_no_mode(self)
             return None
         if self._renderer is None:
             self._renderer = make_renderer(self.task, self.render_mode)
-        shown = range(1 if self.render_mode == "human" else self.num_envs)
-        return tuple(self._renderer.render(self.task.drawing(w)) for w in shown)
+        if self.render_mode == "human":
+            self._renderer.render(self.task.drawing(0))
+            return None
+        return tuple(self._renderer.render(self.task.drawing(w)) for w in range(self.num_envs))
 
     def close_extras(self, **kwargs: Any) -> None:
         """Close the window, if there is one."""

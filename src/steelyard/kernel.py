@@ -34,13 +34,8 @@ def source_stamp(function: Callable[..., Any]) -> tuple[str, str]:
     return _digest(_PACKAGE), _digest(Path(function.__code__.co_filename).resolve().parent)
 
 
-def kernel(function: Callable[..., Any]) -> Any:
-    """Compile a function of plain arrays and scalars, without the GIL, cached on disk.
-
-    Divisions follow IEEE (no exception on zero) and no fast-math is allowed, so results are the same
-    bits wherever a world stands in a batch. Kernels allocate nothing and raise nothing.
-    """
-    dispatcher = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
+def _compile(function: Callable[..., Any], **options: bool) -> Any:
+    dispatcher = numba.njit(cache=True, nogil=True, error_model="numpy", **options)(function)
     store = getattr(dispatcher, "_cache", None)  # absent when NUMBA_DISABLE_JIT is set
     implementation = getattr(store, "_impl", None)
     if implementation is not None:
@@ -50,3 +45,17 @@ def kernel(function: Callable[..., Any]) -> Any:
             source_stamp=source_stamp(function),
         )
     return dispatcher
+
+
+def kernel(function: Callable[..., Any]) -> Any:
+    """Compile a function of plain arrays and scalars, without the GIL, cached on disk.
+
+    Divisions follow IEEE (no exception on zero) and no fast-math is allowed, so results are the same
+    bits wherever a world stands in a batch. Kernels allocate nothing and raise nothing.
+    """
+    return _compile(function)
+
+
+def inner(function: Callable[..., Any]) -> Any:
+    """A kernel that only kernels call: the same, less the wrapper for Python, which takes long to compile."""
+    return _compile(function, no_cpython_wrapper=True, no_cfunc_wrapper=True)

@@ -12,7 +12,7 @@ from .integrators.closed_form import closed_form_step
 from .integrators.explicit_euler import explicit_euler_step
 from .integrators.rattle import rattle_first_half, rattle_second_half
 from .integrators.symplectic_euler import symplectic_euler_step
-from .kernel import kernel
+from .kernel import inner, kernel
 from .math.lanes import LANES, fma, load, select, splat, store
 from .model.tape import (
     CLOSED_FORM,
@@ -39,31 +39,43 @@ from .solvers.worst_first import resolve_worst_first
 FIRST_HALF, SECOND_HALF = 1, 2
 
 
-@kernel
+@inner
+def _load_row(s, row, source, index, first, count):
+    """Copy one row of a block to the scratch; missing worlds repeat the last."""
+    if count == LANES:
+        for k in range(LANES):
+            s[row, k] = source[index, first + k]
+    else:
+        for k in range(LANES):
+            s[row, k] = source[index, first + min(k, count - 1)]
+
+
+@inner
 def _load_block(tape, s, state, given, given_rows, block, worlds):
-    """Copy a block's state and own parameters to the scratch; missing worlds repeat the last."""
+    """Copy a block's state and own parameters to the scratch."""
     first = LANES * block
     count = min(worlds - first, LANES)
     for row in range(tape[H_STATE_ROWS]):
-        for k in range(LANES):
-            s[row, k] = state[row, first + min(k, count - 1)]
+        _load_row(s, row, state, row, first, count)
     for index in range(given_rows.shape[0]):
-        row = given_rows[index]
-        for k in range(LANES):
-            s[row, k] = given[index, first + min(k, count - 1)]
+        _load_row(s, given_rows[index], given, index, first, count)
 
 
-@kernel
+@inner
 def _store_block(tape, s, state, block, worlds):
     """Copy a block's state back."""
     first = LANES * block
     count = min(worlds - first, LANES)
     for row in range(tape[H_STATE_ROWS]):
-        for k in range(count):
-            state[row, first + k] = s[row, k]
+        if count == LANES:
+            for k in range(LANES):
+                state[row, first + k] = s[row, k]
+        else:
+            for k in range(count):
+                state[row, first + k] = s[row, k]
 
 
-@kernel
+@inner
 def _advance_controls(tape, s, dt):
     """Winches and riders move to where they are at the step's end."""
     at = tape[H_WINCHES]
@@ -74,7 +86,7 @@ def _advance_controls(tape, s, dt):
         rider_advance(tape, s, dt)
 
 
-@kernel
+@inner
 def _worst_first(tape, s, ends, values):
     """Contacts of the source's method, world after world."""
     contact_geometry(tape, s)
@@ -83,7 +95,7 @@ def _worst_first(tape, s, ends, values):
         resolve_worst_first(tape, s, k, ends, values, tape[H_POSITION], past, s[tape[H_DT], k])
 
 
-@kernel
+@inner
 def _flag_nonfinite(tape, s):
     """Set the flag of worlds whose positions or velocities are not finite."""
     zero = splat(0.0)
@@ -95,7 +107,7 @@ def _flag_nonfinite(tape, s):
     store(s, flag, select(sum_ <= zero, load(s, flag), splat(1.0)))
 
 
-@kernel
+@inner
 def _step(tape, s, skip, ends, values, dt, phase, fresh):
     """One substep of a block by the method on the tape."""
     integrator = tape[H_INTEGRATOR]

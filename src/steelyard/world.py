@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from .diagnostics.residual import link_residuals
 from .math.lanes import LANES
 from .methods import DEFAULT, Method
 from .model.compile import PARTICLES, Model, compile_model
+from .model.tape import H_DAMPED
 from .scene import checks
 from .scene.contacts import ContactGenerator
 from .scene.forces import UserForce
@@ -70,13 +72,18 @@ class World:
 
     def _run(self, steps: int, phase: int) -> None:
         blocks = -(-self.worlds // LANES)
-        if self.threads == 1 or blocks == 1:
-            self._chunk(0, 0, blocks, steps, phase)
-            return
-        edges = np.linspace(0, blocks, min(self.threads, blocks) + 1).astype(int)
-        jobs = [(k, int(a), int(b)) for k, (a, b) in enumerate(zip(edges, edges[1:], strict=False))]
-        with ThreadPoolExecutor(len(jobs)) as pool:
-            list(pool.map(lambda job: self._chunk(*job, steps, phase), jobs))
+        if self._split:
+            # Between the halves of a step a block's scratch keeps what the step's start decided.
+            edges = np.arange(blocks + 1)
+        else:
+            edges = np.linspace(0, blocks, min(self.threads, blocks) + 1).astype(int)
+        jobs = [(k, int(a), int(b)) for k, (a, b) in enumerate(pairwise(edges))]
+        if self.threads == 1 or len(jobs) == 1:
+            for job in jobs:
+                self._chunk(*job, steps, phase)
+        else:
+            with ThreadPoolExecutor(self.threads) as pool:
+                list(pool.map(lambda job: self._chunk(*job, steps, phase), jobs))
 
     def _chunk(self, thread: int, first: int, last: int, steps: int, phase: int) -> None:
         scratch, skip, ends, values = self._scratch[thread]
@@ -93,10 +100,10 @@ class World:
             self._run(1, FIRST_HALF | SECOND_HALF)
         else:
             self._run(1, FIRST_HALF)
-            self._evaluate_forces()
+            self._evaluate_forces(self.method.dt)
             self._run(1, SECOND_HALF)
 
-    def _evaluate_forces(self) -> None:
+    def _evaluate_forces(self, later: float = 0.0) -> None:
         forces = self.scene.of(UserForce)
         if not forces:
             return
@@ -104,7 +111,7 @@ class World:
         total = np.zeros((self.worlds, len(particles), 3))
         position, velocity = self.particles.position.copy(), self.particles.velocity.copy()
         for force in forces:
-            given = np.asarray(force.function(position, velocity, self.time.copy()))
+            given = np.asarray(force.function(position, velocity, self.time + later))
             if given.shape != total.shape:
                 raise ValueError(
                     f"UserForce: the function returned shape {given.shape}; it must be {total.shape} "
@@ -303,6 +310,22 @@ class World:
             self._prepare()
         return 8 * (self.model.state_rows + len(self._given_rows))
 
+    def __getstate__(self) -> dict[str, Any]:
+        values = list(self.model.parameters.values.values())
+        names = ("scene", "worlds", "threads", "method", "_state")
+        return {name: getattr(self, name) for name in names} | {"values": values}
+
+    def __setstate__(self, kept: dict[str, Any]) -> None:
+        values = kept.pop("values")
+        self.__dict__.update(kept)
+        state = self._state
+        self._compile(None)
+        self._state[:] = state
+        parameters = self.model.parameters.values
+        parameters = dict(zip(parameters, values, strict=True))
+        self.model.parameters.values = parameters
+        self.model.tape[H_DAMPED] = int((parameters[PARTICLES, "damping"] != 1.0).any())
+
     # Inside
 
     def _compile(self, before: World | None) -> None:
@@ -333,7 +356,7 @@ class World:
                 np.zeros(max(model.contacts_most, 1), dtype=np.int64),
                 np.zeros((max(model.contacts_most, 1), 12)),
             )
-            for _ in range(self.threads)
+            for _ in range(-(-self.worlds // LANES) if self._split else self.threads)
         ]
         self._stale = True
 
@@ -402,20 +425,30 @@ def _carry(old: Model, old_state: np.ndarray, new: Model, state: np.ndarray) -> 
             state[row : row + size] = old_state[source : source + size]
     for key, value in old.parameters.values.items():
         present = new.parameters.values.get(key)
-        if present is not None and present.shape[0] == value.shape[0] and key[0] != PARTICLES:
-            new.parameters.values[key] = value
-        elif present is not None and key[0] == PARTICLES:
+        if present is None:
+            continue
+        if key[0] == PARTICLES and key[1] != "gravity":
             _carry_particles(old, new, before, key, value)
+        elif present.shape[0] == value.shape[0]:
+            new.parameters.values[key] = value
+    new.tape[H_DAMPED] = int((new.parameters.values[PARTICLES, "damping"] != 1.0).any())
 
 
 def _carry_particles(old: Model, new: Model, before: dict, key: Any, value: np.ndarray) -> None:
-    """Copy a parameter of the particles that both models hold."""
+    """Copy a parameter of the particles that both models hold; new ones take the assigned gravity."""
     width = value.shape[0] // len(before)
     present = new.parameters.values[key]
-    if value.ndim == 2:
-        present = np.repeat(present[:, None], value.shape[1], axis=1)
+    gravity = old.parameters.values[PARTICLES, "gravity"]
+    if value.ndim == 2 or gravity.ndim == 2:
+        worlds = value.shape[1] if value.ndim == 2 else gravity.shape[1]
+        present = np.repeat(present[:, None], worlds, axis=1)
+        value = np.broadcast_to(value.reshape(len(value), -1), (len(value), worlds))
+        gravity = np.broadcast_to(gravity.reshape(3, -1), (3, worlds))
     for p, particle in enumerate(new.scene.particles):
+        target = slice(width * p, width * p + width)
         if id(particle) in before:
             source = width * before[id(particle)]
-            present[width * p : width * p + width] = value[source : source + width]
+            present[target] = value[source : source + width]
+        elif key[1] == "acceleration" and particle.acceleration is None:
+            present[target] = gravity
     new.parameters.values[key] = present

@@ -1,4 +1,4 @@
-"""Scenes of the benchmarks and of the reference solver as scenes of the engine."""
+"""What the engine's contract tests share: methods, and scenes of the benchmarks and of the reference solver."""
 
 from __future__ import annotations
 
@@ -10,6 +10,27 @@ from benchmarks.scenes import ParticleScene
 from tests.reference_solver import DenseScene
 
 Array = npt.NDArray[np.float64]
+
+# Solvers of displacements and velocities ("staged") with every integrator that takes them. The sweeps
+# suffice to settle the small scenes of the tests; a test that needs more says so.
+STAGED = {
+    "Rattle-Direct": (sy.Rattle(), sy.Direct()),
+    "Rattle-GaussSeidel": (sy.Rattle(), sy.GaussSeidel(passes=60)),
+    "SymplecticEuler-Direct": (sy.SymplecticEuler(), sy.Direct()),
+    "SymplecticEuler-GaussSeidel": (sy.SymplecticEuler(), sy.GaussSeidel(passes=60)),
+}
+# The source's resolver of impulses.
+RESOLVED = {
+    "SymplecticEuler-WorstFirst": (sy.SymplecticEuler(), sy.WorstFirst()),
+    "ExplicitEuler-WorstFirst": (sy.ExplicitEuler(), sy.WorstFirst()),
+}
+METHODS = STAGED | RESOLVED
+
+
+def method(name: str, *, dt: float) -> sy.Method:
+    """A method of the tables above."""
+    integrator, solver = METHODS[name]
+    return sy.Method(integrator, solver, dt=dt)
 
 
 def from_particle_scene(source: ParticleScene, *, cable_restitution: float = 0.0) -> sy.Scene:

@@ -190,3 +190,29 @@ def test_particle_damping_and_drag_around_it_keep_order_2() -> None:
     errors = [np.linalg.norm(final(count) - finest) for count in counts.tolist()]
     slope = -np.polyfit(np.log(counts), np.log(errors), 1)[0]
     assert slope == pytest.approx(2.0, abs=0.1), errors
+
+
+@pytest.mark.parametrize(
+    "method",
+    [
+        sy.Method(sy.Rattle(), sy.Direct(), dt=DT),
+        sy.Method(sy.Rattle(), sy.GaussSeidel(), dt=DT),
+        sy.Method(sy.SymplecticEuler(), sy.Direct(), dt=DT),
+        sy.Method(sy.SymplecticEuler(), sy.GaussSeidel(), dt=DT),
+        sy.Method(sy.SymplecticEuler(), sy.WorstFirst(), dt=DT),
+        sy.Method(sy.ExplicitEuler(), sy.WorstFirst(), dt=DT),
+    ],
+    ids=lambda method: f"{type(method.integrator).__name__}-{type(method.solver).__name__}",
+)
+def test_links_and_contacts_of_other_particles_change_nothing(method: sy.Method) -> None:
+    scene = sy.Scene(gravity=GRAVITY)
+    p = scene.add(sy.Particle(position=ANCHOR + OFFSET, velocity=SPEED, mass=7.0))
+    scene.add(sy.StiffSpring(p, ANCHOR, stiffness=1e6, damping=20.0))
+    a = scene.add(sy.Particle(position=(0, 1, 0), velocity=(1, 0, 0)))
+    b = scene.add(sy.Particle(position=(1, 1, 0)))
+    scene.add(sy.Rod(a, b))
+    scene.add(sy.CableConstraint(a, (0, 2, 0), 1.1))
+    scene.add(sy.Ground(particles=[b], friction=0.5))
+    world = sy.World(scene, method=method)
+    world.step(STEPS)
+    check(world, 0, stiffness=1e6, damping=20.0, inverse_mass=1.0 / 7.0)

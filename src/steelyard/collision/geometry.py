@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from ..kernel import kernel
+from ..kernel import inner
 from ..math.lanes import fma, load, select, splat, sqrt, store
 from ..model.tape import CONTACT, GROUND, H_CONTACTS, LINE
 
 
-@kernel
+@inner
 def _ground(s, contact, tape):
     """Half-space: gap = n . x - height - radius."""
     x = tape[contact + 1]
@@ -21,7 +21,7 @@ def _ground(s, contact, tape):
     store(s, tape[contact + 17], gap)
 
 
-@kernel
+@inner
 def _line(s, contact, tape):
     """Segment: from the nearest point of the line to the particle; up where they coincide."""
     zero = splat(0.0)
@@ -49,7 +49,7 @@ def _line(s, contact, tape):
     store(s, tape[contact + 17], distance - load(s, line + 6) - load(s, tape[contact + 12]))
 
 
-@kernel
+@inner
 def _user(s, contact, tape):
     """Written by the user: normal and penetration lie in the state; 0 or less is no contact."""
     given = tape[contact + 11]
@@ -61,7 +61,7 @@ def _user(s, contact, tape):
     store(s, tape[contact + 17], select(depth > splat(0.0), splat(0.0) - depth, far))
 
 
-@kernel
+@inner
 def _tangents(s, frame):
     """Complete the frame with two tangents (Duff et al. 2017, eq. 3), continuous except at n_z = 0."""
     zero = splat(0.0)
@@ -80,7 +80,7 @@ def _tangents(s, frame):
     store(s, frame + 8, zero - ny)
 
 
-@kernel
+@inner
 def contact_geometry(tape, s):
     """Frame (normal, two tangents) and gap of every contact at the current positions."""
     at = tape[H_CONTACTS]

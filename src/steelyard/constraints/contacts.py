@@ -7,7 +7,7 @@ contact that carried load keeps or gains the separation speed its restitution as
 
 from __future__ import annotations
 
-from ..kernel import kernel
+from ..kernel import inner
 from ..math.lanes import any_lane, fma, load, select, splat, sqrt, store
 from ..model.tape import CONTACT, GROUND, H_CONTACTS
 
@@ -15,7 +15,7 @@ from ..model.tape import CONTACT, GROUND, H_CONTACTS
 _RECOVERY = 0.2
 
 
-@kernel
+@inner
 def contact_motion(s, frame, axis, xa, xb, base_a, base_b):
     """Component along a frame axis of (x_a - base_a) - (x_b - base_b); base rows below 0 are absent."""
     value = splat(0.0)
@@ -29,13 +29,14 @@ def contact_motion(s, frame, axis, xa, xb, base_a, base_b):
     return value
 
 
-@kernel
+@inner
 def contact_targets(tape, s, dt, skip):
     """Decide, at the start of a step, which contacts may close and how each may rebound.
 
     Writes near (1 where the gap can close within the step), the floor under the gap, the separation
     speed after an impact, and held (1 where the contact started in penetration: then its normal is held
-    like a link, so that pushing out leaves no velocity). ``skip`` is set for blocks near in no world.
+    like a link, so that pushing out leaves no velocity; one that parts fast enough by itself is left
+    alone). ``skip`` is set for blocks near in no world.
     Returns whether a factor made before no longer fits: another choice of blocks, or frames that turn.
 
     The speed of an impact is that at the surface, v^2 = v_n^2 + 2 a_n gap; speed that one step's
@@ -65,16 +66,17 @@ def contact_targets(tape, s, dt, skip):
         reach = dt * (sqrt(square) + dt * sqrt(weight))
         near = gap < splat(4.0) * reach
         carried = load(s, tape[contact + 15]) > zero
-        near = near | carried
+        low = gap < splat(-1e-9)
+        leaves = low & (speed * dt > splat(-_RECOVERY) * gap)
+        near = (near | carried) & (select(leaves, one, zero) < splat(0.5))
         # An impact this step: closing, and the surface lies within what speed and acceleration cover.
         fall = zero - speed
         energy = fma(splat(-2.0) * pull, select(gap > zero, gap, zero), fall * fall)
         impact = select(energy > zero, sqrt(energy), zero)
         bounce = select(speed < zero, load(s, tape[contact + 13]) * impact, zero)
-        low = gap < splat(-1e-9)
         store(s, tape[contact + 18], select(near, one, zero))
         store(s, tape[contact + 18] + 1, select(low, splat(1.0 - _RECOVERY) * gap, zero))
-        store(s, tape[contact + 18] + 2, select(low, zero, bounce))
+        store(s, tape[contact + 18] + 2, bounce)
         store(s, tape[contact + 18] + 3, select(low, one, zero))
         left_out = 0 if any_lane(near) else 1
         changed = changed or skip[tape[contact + 20]] != left_out or tape[contact] != GROUND
@@ -82,7 +84,7 @@ def contact_targets(tape, s, dt, skip):
     return changed
 
 
-@kernel
+@inner
 def contact_gap(s, tape, contact):
     """Gap at the current positions above its floor, the normal kept from the step's start."""
     moved = contact_motion(
@@ -97,7 +99,7 @@ def contact_gap(s, tape, contact):
     return load(s, tape[contact + 17]) + moved - load(s, tape[contact + 18] + 1)
 
 
-@kernel
+@inner
 def contact_shift(s, tape, contact, axis):
     """Tangential displacement since the step's start."""
     return contact_motion(
@@ -111,19 +113,19 @@ def contact_shift(s, tape, contact, axis):
     )
 
 
-@kernel
+@inner
 def contact_speed(s, tape, contact, axis):
     """Relative velocity along a frame axis."""
     return contact_motion(s, tape[contact + 16], axis, tape[contact + 3], tape[contact + 4], -1, -1)
 
 
-@kernel
+@inner
 def contact_multiplier(tape, contact, velocity):
     """First row of a contact's multipliers: of the position stage, or of the velocity stage."""
     return tape[contact + 18] + 4 if velocity else tape[contact + 15]
 
 
-@kernel
+@inner
 def contact_impulses(tape, s, skip, velocity):
     """Add every contact's impulse to its particles' impulse rows."""
     at = tape[H_CONTACTS]

@@ -7,12 +7,12 @@ the multiplier is a mass.
 
 from __future__ import annotations
 
-from ..kernel import kernel
+from ..kernel import inner
 from ..math.lanes import fma, load, select, splat, store
 from ..model.tape import H_LINKS, LINK
 
 
-@kernel
+@inner
 def link_half_square(s, link, tape, length):
     """(d.d - L^2)/2 at the current positions."""
     xa = tape[link]
@@ -24,7 +24,7 @@ def link_half_square(s, link, tape, length):
     return splat(0.5) * fma(splat(0.0) - length, length, square)
 
 
-@kernel
+@inner
 def link_rate(s, link, tape):
     """d . (v_a - v_b) with the stored gradient d."""
     va = tape[link + 2]
@@ -35,7 +35,7 @@ def link_rate(s, link, tape):
     return fma(load(s, d + 2), load(s, va + 2) - load(s, vb + 2), rate)
 
 
-@kernel
+@inner
 def link_gradients(tape, s):
     """Store d = x_a - x_b of every link."""
     at = tape[H_LINKS]
@@ -48,7 +48,7 @@ def link_gradients(tape, s):
             store(s, d + component, load(s, xa + component) - load(s, xb + component))
 
 
-@kernel
+@inner
 def link_targets(tape, s):
     """Rate of g each link must have after the step, decided at its start.
 
@@ -72,13 +72,13 @@ def link_targets(tape, s):
             store(s, tape[link + 14] + 1, select(over, splat(1.0), zero))
 
 
-@kernel
+@inner
 def link_multiplier(tape, link, velocity):
     """Row of a link's multiplier: of the position stage, or of the velocity stage."""
     return tape[link + 14] + 2 if velocity else tape[link + 12]
 
 
-@kernel
+@inner
 def link_impulses(tape, s, velocity):
     """Add every multiplier's impulse to the particles' impulse rows."""
     at = tape[H_LINKS]

@@ -6,7 +6,7 @@ rows (coefficients, then velocity multipliers), accelerations, then per deck par
 
 from __future__ import annotations
 
-from ..kernel import kernel
+from ..kernel import inner
 from ..math.lanes import fma, load, splat, store
 from ..model.tape import H_RIDERS
 
@@ -14,7 +14,7 @@ HEAD = 11
 DECK = 4
 
 
-@kernel
+@inner
 def rider_offset(s, tape, rider, component):
     """x - sum of w_i x_i, one component."""
     zero = splat(0.0)
@@ -26,7 +26,7 @@ def rider_offset(s, tape, rider, component):
     return value
 
 
-@kernel
+@inner
 def rider_slip(s, tape, rider, component):
     """v - sum of (w_i v_i + dw_i/dt x_i), one component."""
     zero = splat(0.0)
@@ -40,7 +40,7 @@ def rider_slip(s, tape, rider, component):
     return value
 
 
-@kernel
+@inner
 def rider_coefficients(tape, s):
     """Keep minus the present weights, the deck's coefficients: they direct the impulses."""
     at = tape[H_RIDERS] + 1
@@ -51,7 +51,7 @@ def rider_coefficients(tape, s):
         at += HEAD + DECK * count
 
 
-@kernel
+@inner
 def rider_advance(tape, s, dt):
     """Move the weights over ``dt`` at constant acceleration."""
     at = tape[H_RIDERS] + 1
@@ -66,13 +66,13 @@ def rider_advance(tape, s, dt):
         at += HEAD + DECK * count
 
 
-@kernel
+@inner
 def rider_multiplier(tape, rider, velocity):
     """First row of a rider's multipliers: of the position stage, or of the velocity stage."""
     return tape[rider + 9] + tape[rider + 6] if velocity else tape[rider + 3]
 
 
-@kernel
+@inner
 def rider_impulses(tape, s, velocity):
     """Add every rider's impulse to the load and, weighted, with the opposite sign to its deck."""
     at = tape[H_RIDERS] + 1

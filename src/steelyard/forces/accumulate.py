@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..kernel import kernel
+from ..kernel import inner
 from ..math.lanes import load, splat, store
 from ..model.tape import H_FORCE, H_FORCED, H_PARTICLES, H_USER_FORCES
 from .buoyancy import add_buoyancy
@@ -10,7 +10,7 @@ from .gravity import add_gravity
 from .springs import add_springs
 
 
-@kernel
+@inner
 def accumulate_forces(tape, s):
     """Clear the force rows and add all forces but drag, which integrators treat in their own way."""
     if tape[H_FORCED] == 0:

@@ -5,14 +5,14 @@ Record: row of y, row of F_y, then the rows of h, d and rho V g.
 
 from __future__ import annotations
 
-from ..kernel import kernel
+from ..kernel import inner
 from ..math.lanes import fma, load, select, splat, store
 from ..model.tape import H_BUOYANCIES
 
 RECORD = 5
 
 
-@kernel
+@inner
 def add_buoyancy(tape, s):
     """Add every float's lift to the force rows."""
     zero = splat(0.0)

@@ -10,14 +10,14 @@ and the direction stays. Record: velocity, force, k1, k2, first row of the wind,
 
 from __future__ import annotations
 
-from ..kernel import kernel
+from ..kernel import inner
 from ..math.lanes import fma, load, splat, sqrt, store
 from ..model.tape import H_DRAGS
 
 RECORD = 7
 
 
-@kernel
+@inner
 def add_drag(tape, s):
     """Add every drag to the force rows."""
     at = tape[H_DRAGS]
@@ -36,12 +36,16 @@ def add_drag(tape, s):
         store(s, f + 2, fma(brake, z, load(s, f + 2)))
 
 
-@kernel
-def flow_drag(tape, s):
-    """Change every velocity by the exact flow of its drag."""
+@inner
+def flow_drag(tape, s, backwards):
+    """Change every velocity by the exact flow of its drag; one after the other where several act.
+
+    The two halves of a step take them in opposite orders, which keeps the splitting symmetric.
+    """
     at = tape[H_DRAGS]
-    for index in range(tape[at]):
-        k = at + 1 + RECORD * index
+    count = tape[at]
+    for index in range(count):
+        k = at + 1 + RECORD * (count - 1 - index if backwards else index)
         v = tape[k]
         wind = tape[k + 4]
         x = load(s, v) - load(s, wind)

@@ -5,14 +5,14 @@ Record: force, mass, first row of g.
 
 from __future__ import annotations
 
-from ..kernel import kernel
+from ..kernel import inner
 from ..math.lanes import fma, load, store
 from ..model.tape import H_GRAVITIES
 
 RECORD = 3
 
 
-@kernel
+@inner
 def add_gravity(tape, s):
     """Add every gravity's force to the force rows; the mass row of an immovable particle is 0."""
     at = tape[H_GRAVITIES]

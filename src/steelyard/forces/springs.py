@@ -6,14 +6,14 @@ direction, and so the force, is taken as zero. Energy k (l - l0)^2 / 2.
 
 from __future__ import annotations
 
-from ..kernel import kernel
+from ..kernel import inner
 from ..math.lanes import fma, load, select, splat, sqrt, store
 from ..model.tape import H_SPRINGS
 
 RECORD = 7
 
 
-@kernel
+@inner
 def add_springs(tape, s):
     """Add every spring's force to the force rows."""
     zero = splat(0.0)

@@ -8,14 +8,14 @@ Record: x, v, acceleration, force, inverse mass, first row of p, first row of th
 
 from __future__ import annotations
 
-from ..kernel import kernel
+from ..kernel import inner
 from ..math.lanes import fma, load, store
-from ..model.tape import H_FORCED, H_STIFF_SPRINGS
+from ..model.tape import H_CONSTRAINED, H_FORCED, H_FREE, H_POSITION, H_STIFF_SPRINGS
 
 RECORD = 8
 
 
-@kernel
+@inner
 def flow_stiff_springs(tape, s):
     """Move every sprung particle by the exact solution over the step."""
     at = tape[H_STIFF_SPRINGS]
@@ -30,5 +30,8 @@ def flow_stiff_springs(tape, s):
             centre = fma(pull, load(s, tape[k + 7]), load(s, tape[k + 6] + component))
             y = load(s, tape[k] + component) - centre
             v = load(s, tape[k + 1] + component)
-            store(s, tape[k] + component, fma(load(s, p), y, fma(load(s, p + 1), v, centre)))
+            moved = fma(load(s, p), y, fma(load(s, p + 1), v, centre))
+            store(s, tape[k] + component, moved)
+            if tape[H_CONSTRAINED] != 0:
+                store(s, tape[H_FREE] + tape[k] - tape[H_POSITION] + component, moved)
             store(s, tape[k + 1] + component, fma(load(s, p + 2), y, load(s, p + 3) * v))

@@ -17,7 +17,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from ..kernel import kernel
+from ..kernel import inner, kernel
 from ..math.lanes import fma, load, store
 from ..model.tape import CLOSED_FORM, H_ACCELERATION, H_DAMPING, H_DRIFT, H_POSITION, H_VELOCITY
 from .base import Integrator
@@ -38,7 +38,7 @@ class ClosedForm(Integrator):
         return math.inf
 
 
-@kernel
+@inner
 def closed_form_step(tape, s):
     """Rows H_DAMPING: per particle e^(-ch), phi1(h), phi2(h)."""
     at = tape[H_DRIFT]
@@ -81,34 +81,55 @@ def flight(position, velocity, acceleration, rate, time):
 
 
 @kernel
-def flight_fall_time(height, velocity, acceleration, rate):
-    """Time until a particle ``height`` above a level falls through it; inf if it never does.
-
-    Newton's method from a time past the impact: beyond the apex the height is concave, so the iteration
-    falls onto the root from above without overshooting.
-    """
-    if height < 0.0 or (height == 0.0 and velocity <= 0.0):
-        return 0.0
-    if acceleration >= 0.0:
-        if acceleration > 0.0 or velocity >= 0.0:
-            return math.inf
-        reach = height + velocity / rate if rate > 0.0 else -1.0
-        if reach >= 0.0:
-            return math.inf
-    # The undamped fall is no later for v <= 0; rising, damping only shortens the rise. Double until below.
-    time = 1e-3
-    if acceleration < 0.0:
-        root = math.sqrt(velocity * velocity - 2.0 * acceleration * height)
-        time = max((velocity + root) / -acceleration, 1e-9)
-    while flight(height, velocity, acceleration, rate, time)[0] > 0.0:
-        time *= 2.0
+def _newton(height, velocity, acceleration, rate, time):
+    """Root of the height by Newton's method from ``time``, on a side from which it cannot overshoot."""
     for _ in range(100):
         place, speed = flight(height, velocity, acceleration, rate, time)
         change = place / speed
         time -= change
-        if abs(change) <= 2e-16 * time:
+        if not abs(change) > 2e-16 * time:
             break
     return time
+
+
+@kernel
+def flight_fall_time(height, velocity, acceleration, rate):
+    """Time until a particle ``height`` above a level falls through it; inf if it never does.
+
+    A particle below the level that rises through it counts when it comes down again; one that is below
+    and stays there has fallen at time 0.
+    """
+    rises = velocity > 0.0
+    # Turning point of the height, where there is one.
+    turn = math.inf
+    if velocity != 0.0 and acceleration != 0.0 and rises == (acceleration < 0.0):
+        turn = (
+            math.log1p(-velocity * rate / acceleration) / rate
+            if rate > 0.0
+            else -velocity / acceleration
+        )
+    extreme = flight(height, velocity, acceleration, rate, turn)[0] if turn < math.inf else 0.0
+    if height < 0.0 or (height == 0.0 and not rises):
+        if not (rises and acceleration < 0.0 and extreme > 0.0):
+            return 0.0
+    if acceleration < 0.0:
+        if rate * velocity < acceleration:
+            # Faster than its terminal speed: the height is convex, and Newton's method safe from the start.
+            return _newton(height, velocity, acceleration, rate, 0.0)
+        # Concave: safe from any time past the root. Without drag it falls for at most this long; double.
+        root = math.sqrt(max(velocity * velocity - 2.0 * acceleration * height, 0.0))
+        time = max((velocity + root) / -acceleration, 1e-9)
+        while flight(height, velocity, acceleration, rate, time)[0] > 0.0:
+            time *= 2.0
+        return _newton(height, velocity, acceleration, rate, time)
+    if rises or velocity == 0.0:
+        return math.inf
+    if acceleration == 0.0:
+        if rate == 0.0:
+            return -height / velocity
+        share = -height * rate / velocity
+        return -math.log1p(-share) / rate if share < 1.0 else math.inf
+    return math.inf if extreme > 0.0 else _newton(height, velocity, acceleration, rate, 0.0)
 
 
 def flight_impact(

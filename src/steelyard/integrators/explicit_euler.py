@@ -13,10 +13,20 @@ from typing import ClassVar
 from ..forces.accumulate import accumulate_forces
 from ..forces.drag import add_drag
 from ..forces.stiff_spring import flow_stiff_springs
-from ..kernel import kernel
-from ..model.tape import EXPLICIT_EULER
+from ..kernel import inner
+from ..math.lanes import load, store
+from ..model.tape import (
+    EXPLICIT_EULER,
+    H_ACCELERATION,
+    H_DRIFT,
+    H_FORCE,
+    H_FORCED,
+    H_INVERSE_MASS,
+    H_POSITION,
+    H_VELOCITY,
+)
 from .base import Integrator
-from .motion import damp, drift, kick
+from .motion import damp
 
 
 @dataclass(frozen=True)
@@ -35,12 +45,29 @@ class ExplicitEuler(Integrator):
         return 0.0
 
 
-@kernel
+@inner
+def _integrate(tape, s, dt):
+    """x += h v, then v += h a, each product rounded as in the source: its resolver breaks ties by the last bit."""
+    at = tape[H_DRIFT]
+    for index in range(tape[at]):
+        p = tape[at + 1 + index]
+        inverse = load(s, tape[H_INVERSE_MASS] + p)
+        for component in range(3):
+            row = 3 * p + component
+            x = tape[H_POSITION] + row
+            v = tape[H_VELOCITY] + row
+            a = load(s, tape[H_ACCELERATION] + row)
+            if tape[H_FORCED] != 0:
+                a = a + load(s, tape[H_FORCE] + row) * inverse
+            store(s, x, load(s, x) + load(s, v) * dt)
+            store(s, v, load(s, v) + a * dt)
+
+
+@inner
 def explicit_euler_step(tape, s, dt):
     """Integrate; contacts are resolved afterwards."""
     accumulate_forces(tape, s)
     add_drag(tape, s)
-    drift(tape, s, dt)
-    kick(tape, s, dt)
+    _integrate(tape, s, dt)
     damp(tape, s)
     flow_stiff_springs(tape, s)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..kernel import kernel
+from ..kernel import inner
 from ..math.lanes import fma, load, splat, store
 from ..model.tape import (
     H_ACCELERATION,
@@ -22,7 +22,7 @@ from ..model.tape import (
 )
 
 
-@kernel
+@inner
 def kick(tape, s, dt):
     """v += dt (a + F/m) for every particle but those on a stiff spring, whose flow holds all of it."""
     at = tape[H_DRIFT]
@@ -38,7 +38,7 @@ def kick(tape, s, dt):
             store(s, v, fma(dt, a, load(s, v)))
 
 
-@kernel
+@inner
 def damp(tape, s):
     """v *= damping^(share of the step); the powers lie in the damping rows."""
     if tape[H_DAMPED] != 0:
@@ -49,7 +49,7 @@ def damp(tape, s):
                 store(s, v, load(s, v) * factor)
 
 
-@kernel
+@inner
 def drift(tape, s, dt):
     """x += dt v; with constraints the start is kept and the result also becomes the free position."""
     at = tape[H_DRIFT]
@@ -66,7 +66,7 @@ def drift(tape, s, dt):
             store(s, tape[H_POSITION] + row, moved)
 
 
-@kernel
+@inner
 def add_stage_velocity(tape, s, dt):
     """v += M^-1 impulse / dt: what the position stage's impulses did to the velocities."""
     inverse_dt = splat(1.0) / dt
@@ -80,7 +80,7 @@ def add_stage_velocity(tape, s, dt):
             store(s, v, fma(weight, load(s, tape[H_IMPULSE] + row), load(s, v)))
 
 
-@kernel
+@inner
 def keep_free_velocity(tape, s):
     """Free rows = velocities, from which the velocity stage starts."""
     for row in range(3 * tape[H_PARTICLES]):

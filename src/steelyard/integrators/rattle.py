@@ -16,7 +16,7 @@ from typing import ClassVar
 from ..forces.accumulate import accumulate_forces
 from ..forces.drag import flow_drag
 from ..forces.stiff_spring import flow_stiff_springs
-from ..kernel import kernel
+from ..kernel import inner
 from ..math.lanes import splat
 from ..model.tape import RATTLE
 from .base import Integrator
@@ -40,21 +40,21 @@ class Rattle(Integrator):
         return 2.0
 
 
-@kernel
+@inner
 def rattle_first_half(tape, s, dt):
     """Up to the drift; the position stage follows."""
     accumulate_forces(tape, s)
     damp(tape, s)
-    flow_drag(tape, s)
+    flow_drag(tape, s, False)
     kick(tape, s, splat(0.5) * dt)
     drift(tape, s, dt)
     flow_stiff_springs(tape, s)
 
 
-@kernel
+@inner
 def rattle_second_half(tape, s, dt):
     """From the new positions on; the velocity stage follows."""
     accumulate_forces(tape, s)
     kick(tape, s, splat(0.5) * dt)
-    flow_drag(tape, s)
+    flow_drag(tape, s, True)
     damp(tape, s)

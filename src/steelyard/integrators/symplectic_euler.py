@@ -12,7 +12,7 @@ from typing import ClassVar
 from ..forces.accumulate import accumulate_forces
 from ..forces.drag import flow_drag
 from ..forces.stiff_spring import flow_stiff_springs
-from ..kernel import kernel
+from ..kernel import inner
 from ..model.tape import SYMPLECTIC_EULER
 from .base import Integrator
 from .motion import damp, drift, kick
@@ -34,12 +34,12 @@ class SymplecticEuler(Integrator):
         return 2.0
 
 
-@kernel
+@inner
 def symplectic_euler_step(tape, s, dt):
     """Damp, kick and drift; constraints follow."""
     accumulate_forces(tape, s)
     damp(tape, s)
-    flow_drag(tape, s)
+    flow_drag(tape, s, False)
     kick(tape, s, dt)
     drift(tape, s, dt)
     flow_stiff_springs(tape, s)

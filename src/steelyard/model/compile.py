@@ -161,6 +161,9 @@ class Compiler:
         user = self.scene.of(UserForce)
         header["user_forces"] = self.state((PARTICLES, "user"), [0.0] * 3 * count) if user else -1
         self._user_contacts()
+        if self.method.solver is not None and self.method.solver.code == tape.WORST_FIRST:
+            most = max(len(self.links) + len(self.contacts), 1)
+            header["moves"] = self.state((PARTICLES, "moves"), np.zeros(6 * most))
         header["time"] = self.state((PARTICLES, "time"), [0.0])
         header["unsettled"] = self.state((PARTICLES, "unsettled"), [0.0])
         header["nonfinite"] = self.state((PARTICLES, "nonfinite"), [0.0])
@@ -232,24 +235,17 @@ class Compiler:
         own = [
             self.scene.gravity if p.acceleration is None else p.acceleration for p in self.particles
         ]
-        follows = np.array([p.acceleration is None for p in self.particles])
         declare((PARTICLES, "acceleration"), np.array(own, dtype=np.float64).ravel())
         declare((PARTICLES, "radius"), [p.radius for p in self.particles])
         declare((PARTICLES, "gravity"), self.scene.gravity)
-        self.follows = follows
         mass_key = (PARTICLES, "inverse_mass")
         self.header["inverse_mass"] = self.slot(count, (mass_key,), lambda value: value)
 
-        def acceleration(values: np.ndarray, masses: np.ndarray) -> np.ndarray:
-            movable = np.repeat(masses > 0.0, 3, axis=0)
-            if movable.ndim > values.ndim:
-                values = values[:, None]
-            elif values.ndim > movable.ndim:
-                movable = movable[:, None]
-            return np.where(movable, values, 0.0)
-
+        movable = np.repeat(~fixed, 3).astype(np.float64)
         self.header["acceleration"] = self.slot(
-            3 * count, ((PARTICLES, "acceleration"), mass_key), acceleration
+            3 * count,
+            ((PARTICLES, "acceleration"),),
+            lambda value: value * (movable if value.ndim == 1 else movable[:, None]),
         )
         share = method.integrator.damping_share * method.dt
         damping_key = (PARTICLES, "damping")
@@ -346,7 +342,11 @@ class Compiler:
                     ]  # fmt: skip
         self.sections["stiff_springs"] = []
         for stiff in scene.of(StiffSpring):
-            self._stiff_spring(stiff)
+            if stiff.particle.movable:
+                self._stiff_spring(stiff)
+            else:
+                for name in ("anchor", "stiffness", "damping"):
+                    self.parameters.declare((stiff, name), getattr(stiff, name))
 
     def some(self, chosen: Any) -> list[Particle]:
         """The chosen particles, or all."""
@@ -417,7 +417,7 @@ class Compiler:
                     self.at("impulse", other),
                     self.header["inverse_mass"] + self.of(other),
                 )
-            work = self.take(6) if staged else -1
+            work = self.take(7) if staged else -1
             records += [
                 self.at("position", a), b[0], self.at("velocity", a), b[1], self.at("impulse", a), b[2],
                 self.header["inverse_mass"] + self.of(a), b[3], length_row, rate_row, int(cable), restitution,
@@ -431,7 +431,7 @@ class Compiler:
         """A record per rider."""
         records: list[int] = []
         for rider in self.riders:
-            held = self.take(len(rider.deck) + 3)
+            held = self.take(len(rider.deck) + 6)
             load = rider.particle
             records += [
                 self.at("position", load), self.at("velocity", load), self.at("impulse", load),
@@ -488,7 +488,7 @@ class Compiler:
                 self.at("acceleration", a), other[4], place, radii[id(a)], restitution, friction,
                 self.place(generator, f"multiplier {k}") if staged else -1, self.take(9), self.take(1),
                 self.take(7) if staged else -1, -1, len(records) // CONTACT, self.at("start", a), other[5],
-                self.take(3) if staged else -1,
+                self.take(6) if staged else -1,
             ]  # fmt: skip
         self.sections["contacts"] = records
         self.model.contacts_most = len(self.links) + len(self.contacts)
@@ -567,4 +567,4 @@ def compile_model(scene: Scene, method: Method) -> Model:
         ValueError: the method cannot do what the scene holds.
     """
     method.refuse(scene)
-    return Compiler(scene, method).compile()
+    return Compiler(scene.copy(), method).compile()

@@ -361,7 +361,7 @@ class Network:
             others += [
                 (self.a[k, i], k, 1) for k in range(i + 1, self.count) if i in self.pattern[k]
             ]
-            products += [3 * block, self.diagonal[i], block, len(others)]
+            products += [3 * block, self.diagonal[i], block, self.reference[i], len(others)]
             for rows, k, transposed in others:
                 products += [rows, 3 * self.order[k], transposed, self.order[k]]
         size = self.count - first

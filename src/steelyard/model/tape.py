@@ -64,12 +64,13 @@ from __future__ import annotations
     H_CONTACT_PRODUCTS,
     H_DENSE,
     H_TOTAL,
+    H_MOVES,
     H_RIGHT,
     H_GUESS,
     H_MASK,
     H_USED_MASK,
-) = range(59)
-HEADER = 59
+) = range(60)
+HEADER = 60
 
 # Width of the records of links and contacts; ``model.compile`` writes them field by field.
 LINK = 16

@@ -16,19 +16,19 @@ row that depends on earlier ones: its inverse is set to 0, which leaves that row
 
 from __future__ import annotations
 
-from ..kernel import kernel
+from ..kernel import inner
 from ..math.lanes import fma, load, select, splat, store
 
 _PIVOT = 1e-10
 
 
-@kernel
+@inner
 def _inverse_pivot(pivot, reference):
     zero = splat(0.0)
     return select(pivot > splat(_PIVOT) * reference, splat(1.0) / pivot, zero)
 
 
-@kernel
+@inner
 def _invert(s, a, out, reference):
     """Inverse of a symmetric 3 x 3 block by LDL^T, dependent rows left out."""
     zero = splat(0.0)
@@ -53,30 +53,52 @@ def _invert(s, a, out, reference):
     store(s, out + 5, i2)
 
 
-@kernel
-def _subtract_product(s, target, left, right):
-    """target -= left right^T for 3 x 3 blocks stored row by row."""
+@inner
+def _subtract_products(tape, at, count, s, skip, target):
+    """target -= sum of A_IK P_JK^T over the block's product records; the nine sums stay in registers."""
     zero = splat(0.0)
-    b00 = load(s, right)
-    b01 = load(s, right + 1)
-    b02 = load(s, right + 2)
-    b10 = load(s, right + 3)
-    b11 = load(s, right + 4)
-    b12 = load(s, right + 5)
-    b20 = load(s, right + 6)
-    b21 = load(s, right + 7)
-    b22 = load(s, right + 8)
-    for row in range(3):
-        at = 3 * row
-        x = zero - load(s, left + at)
-        y = zero - load(s, left + at + 1)
-        z = zero - load(s, left + at + 2)
-        store(s, target + at, fma(z, b02, fma(y, b01, fma(x, b00, load(s, target + at)))))
-        store(s, target + at + 1, fma(z, b12, fma(y, b11, fma(x, b10, load(s, target + at + 1)))))
-        store(s, target + at + 2, fma(z, b22, fma(y, b21, fma(x, b20, load(s, target + at + 2)))))
+    a00 = load(s, target)
+    a01 = load(s, target + 1)
+    a02 = load(s, target + 2)
+    a10 = load(s, target + 3)
+    a11 = load(s, target + 4)
+    a12 = load(s, target + 5)
+    a20 = load(s, target + 6)
+    a21 = load(s, target + 7)
+    a22 = load(s, target + 8)
+    for product in range(count):
+        record = at + 3 * product
+        if skip[tape[record + 2]] == 0:
+            left = tape[record]
+            right = tape[record + 1]
+            for column in range(3):
+                x = zero - load(s, left + column)
+                y = zero - load(s, left + 3 + column)
+                z = zero - load(s, left + 6 + column)
+                b0 = load(s, right + column)
+                b1 = load(s, right + 3 + column)
+                b2 = load(s, right + 6 + column)
+                a00 = fma(x, b0, a00)
+                a01 = fma(x, b1, a01)
+                a02 = fma(x, b2, a02)
+                a10 = fma(y, b0, a10)
+                a11 = fma(y, b1, a11)
+                a12 = fma(y, b2, a12)
+                a20 = fma(z, b0, a20)
+                a21 = fma(z, b1, a21)
+                a22 = fma(z, b2, a22)
+    store(s, target, a00)
+    store(s, target + 1, a01)
+    store(s, target + 2, a02)
+    store(s, target + 3, a10)
+    store(s, target + 4, a11)
+    store(s, target + 5, a12)
+    store(s, target + 6, a20)
+    store(s, target + 7, a21)
+    store(s, target + 8, a22)
 
 
-@kernel
+@inner
 def _subtract_square(s, target, left, right):
     """Lower half of target -= left right^T, where the product is symmetric."""
     zero = splat(0.0)
@@ -93,7 +115,7 @@ def _subtract_square(s, target, left, right):
             entry += 1
 
 
-@kernel
+@inner
 def _scale(s, a, inverse, out):
     """out = a inverse, ``inverse`` symmetric in six rows."""
     d00 = load(s, inverse)
@@ -111,7 +133,7 @@ def _scale(s, a, inverse, out):
         store(s, out + 3 * row + 2, fma(z, d22, fma(y, d21, x * d20)))
 
 
-@kernel
+@inner
 def factor(tape, at, s, skip):
     """Factorise in place; ``tape[at]`` starts the tape above. ``skip`` (blocks,) flags blocks left out."""
     rows = tape[at]
@@ -131,10 +153,8 @@ def factor(tape, at, s, skip):
             products = tape[at + 4]
             at += 5
             if there:
-                for product in range(products):
-                    k = at + 3 * product
-                    if skip[tape[k + 2]] == 0:
-                        _subtract_product(s, a, tape[k], tape[k + 1])
+                if products > 0:
+                    _subtract_products(tape, at, products, s, skip, a)
                 if column_inverse >= 0:
                     _scale(s, a, column_inverse, p)
                     _subtract_square(s, diagonal, a, p)
@@ -143,7 +163,7 @@ def factor(tape, at, s, skip):
             _invert(s, diagonal, inverse, reference)
 
 
-@kernel
+@inner
 def forward(tape, at, s, skip):
     """y_I = r_I - sum of P_IJ y_J, in place.
 
@@ -181,7 +201,7 @@ def forward(tape, at, s, skip):
         at += 3 * columns
 
 
-@kernel
+@inner
 def backward(tape, at, s, skip):
     """z_I = D_I^-1 y_I - sum over later K of P_KI^T z_K, in place.
 

@@ -8,7 +8,7 @@ Gauss-Seidel on W, whose fixed point is the law itself.
 
 from __future__ import annotations
 
-from ..kernel import kernel
+from ..kernel import inner
 from ..math.lanes import absolute, any_lane, fma, load, select, splat, sqrt, store
 from ..model.tape import (
     CONTACT,
@@ -25,32 +25,39 @@ from ..model.tape import (
     H_TOTAL,
 )
 from . import block_ldl
-from .cone_newton import newton
+from .cone_newton import SOFTNESS, newton, softened_motion
 from .cone_rows import relative_motion
 
 _SWEEPS = 400
-_SOFTNESS = 1e-6
-_REPEATS = 2
+_REPEATS = 3
+_ANCHORS = 2
 
 
-@kernel
-def _stick(tape, s, skip):
-    """Solve W l = b over the masked rows into the guess rows.
+@inner
+def factorise_contacts(tape, s, skip):
+    """Factor of W over the masked rows, a little softened.
 
-    Friction is redundant where links join contacts. A share ``_SOFTNESS`` on the diagonal makes the solution the
-    one of least norm, which spreads friction and so stays inside the cones where it can; repeating the
-    solve on what is left of b (the proximal point method) takes the softness out again.
+    Contacts joined by links share their load in more ways than one. A little softness on the diagonal makes the solution the one of
+    least norm, which spreads friction and so stays inside the cones where it can.
     """
-    zero = splat(0.0)
     at = tape[H_CONTACT_COPIES]
     for index in range(tape[at]):
         k = at + 1 + 5 * index
         taken = load(s, tape[k + 2]) * load(s, tape[k + 3])
         value = load(s, tape[k + 1]) * taken
         if tape[k + 4] >= 0:
-            value = fma(load(s, tape[k + 4]), splat(1.0 + _SOFTNESS) - taken, value)
+            value = fma(load(s, tape[k + 4]), splat(1.0 + SOFTNESS) - taken, value)
         store(s, tape[k], value)
     block_ldl.factor(tape, tape[H_CONTACT_FACTOR], s, skip)
+
+
+@inner
+def _stick(tape, s, skip):
+    """Solve W l = b over the masked rows into the guess rows.
+
+    Repeating the solve on what is left of b takes the factor's softness out (the proximal point method).
+    """
+    zero = splat(0.0)
     at = tape[H_CONTACTS]
     guess = tape[H_GUESS]
     total = tape[H_TOTAL]
@@ -58,19 +65,26 @@ def _stick(tape, s, skip):
         slot = tape[at + 1 + CONTACT * index + 19]
         for row in range(slot, slot + 3):
             store(s, total + row, zero)
-    for _ in range(_REPEATS):
+    for repeat in range(_REPEATS):
         k = tape[H_CONTACT_PRODUCTS] + 1
         for index in range(tape[at]):
             contact = at + 1 + CONTACT * index
             if skip[tape[contact + 20]] == 0:
                 slot = tape[contact + 19]
-                a, b, c = relative_motion(tape, s, skip, k, total)
                 right = tape[H_RIGHT] + slot
                 mask = tape[H_MASK] + slot
-                store(s, guess + slot, (load(s, right) - a) * load(s, mask))
-                store(s, guess + slot + 1, (load(s, right + 1) - b) * load(s, mask + 1))
-                store(s, guess + slot + 2, (load(s, right + 2) - c) * load(s, mask + 2))
-            k += 4 + 4 * tape[k + 3]
+                a = load(s, right)
+                b = load(s, right + 1)
+                c = load(s, right + 2)
+                if repeat > 0:
+                    x, y, z = relative_motion(tape, s, skip, k, total)
+                    a = a - x
+                    b = b - y
+                    c = c - z
+                store(s, guess + slot, a * load(s, mask))
+                store(s, guess + slot + 1, b * load(s, mask + 1))
+                store(s, guess + slot + 2, c * load(s, mask + 2))
+            k += 5 + 4 * tape[k + 4]
         block_ldl.forward(tape, tape[H_CONTACT_FORWARD], s, skip)
         block_ldl.backward(tape, tape[H_CONTACT_BACKWARD], s, skip)
         for index in range(tape[at]):
@@ -84,7 +98,7 @@ def _stick(tape, s, skip):
             store(s, guess + row, load(s, total + row))
 
 
-@kernel
+@inner
 def _violated(tape, s, skip, velocity):
     """Worlds in which the guess breaks a condition."""
     zero = splat(0.0)
@@ -111,11 +125,11 @@ def _violated(tape, s, skip, velocity):
             if velocity:
                 pulls = pulls & (load(s, tape[contact + 18] + 3) < half)
             bad = bad | closes | (loaded & (pulls | slips))
-        k += 4 + 4 * tape[k + 3]
+        k += 5 + 4 * tape[k + 4]
     return bad
 
 
-@kernel
+@inner
 def _sweep(tape, s, skip, velocity, worlds):
     """Projected Gauss-Seidel on W in the worlds of the mask, from the guess rows; worlds that did not settle."""
     zero = splat(0.0)
@@ -132,15 +146,15 @@ def _sweep(tape, s, skip, velocity, worlds):
                 slot = tape[contact + 19]
                 w = tape[k + 1]
                 possible = load(s, tape[contact + 18]) > half
-                a, b, c = relative_motion(tape, s, skip, k, tape[H_GUESS])
+                a, b, c = softened_motion(tape, s, skip, contact, k)
                 guess = tape[H_GUESS] + slot
-                right = tape[H_RIGHT] + slot
                 n0 = load(s, guess)
                 t0 = load(s, guess + 1)
                 u0 = load(s, guess + 2)
-                w00 = load(s, w)
+                soft = splat(SOFTNESS) * load(s, tape[k + 3])
+                w00 = load(s, w) + soft
                 stiff = w00 > zero
-                step = select(stiff, (a - load(s, right)) / select(stiff, w00, splat(1.0)), zero)
+                step = select(stiff, a / select(stiff, w00, splat(1.0)), zero)
                 n = n0 - step
                 pushing = n > zero
                 if velocity:
@@ -149,12 +163,12 @@ def _sweep(tape, s, skip, velocity, worlds):
                 jump = n - n0
                 b = fma(load(s, w + 1), jump, b)
                 c = fma(load(s, w + 3), jump, c)
-                w11 = load(s, w + 2)
-                w22 = load(s, w + 5)
+                w11 = load(s, w + 2) + soft
+                w22 = load(s, w + 5) + soft
                 size = select(w11 > w22, w11, w22) + absolute(load(s, w + 4))
                 inverse = select(size > zero, splat(1.0) / size, zero)
-                t = fma(zero - inverse, b - load(s, right + 1), t0)
-                u = fma(zero - inverse, c - load(s, right + 2), u0)
+                t = fma(zero - inverse, b, t0)
+                u = fma(zero - inverse, c, u0)
                 bound = load(s, tape[contact + 14]) * select(n > zero, n, zero)
                 length = sqrt(fma(u, u, t * t))
                 outside = length > bound
@@ -172,14 +186,14 @@ def _sweep(tape, s, skip, velocity, worlds):
                     change = select(moved > change, moved, change)
                     extent = absolute(value)
                     largest = select(extent > largest, extent, largest)
-            k += 4 + 4 * tape[k + 3]
-        moving = moving & (change > splat(1e-13) * largest)
+            k += 5 + 4 * tape[k + 4]
+        moving = moving & (change > splat(1e-12) * largest)
         if not any_lane(moving):
             break
     return moving
 
 
-@kernel
+@inner
 def _put_back(tape, s, skip, worlds):
     """Guess rows of ``worlds`` back to the multipliers at hand."""
     at = tape[H_CONTACTS]
@@ -192,7 +206,19 @@ def _put_back(tape, s, skip, worlds):
                 store(s, guess, select(worlds, old, load(s, guess)))
 
 
-@kernel
+@inner
+def _anchor(tape, s, skip):
+    """Softness pulls towards the impulses of the guess."""
+    at = tape[H_CONTACTS]
+    for index in range(tape[at]):
+        contact = at + 1 + CONTACT * index
+        if skip[tape[contact + 20]] == 0:
+            for axis in range(3):
+                value = load(s, tape[H_GUESS] + tape[contact + 19] + axis)
+                store(s, tape[contact + 23] + 3 + axis, value)
+
+
+@inner
 def solve_contacts(tape, s, skip, velocity):
     """Solve the contact problem left by elimination.
 
@@ -214,18 +240,19 @@ def solve_contacts(tape, s, skip, velocity):
             for axis in range(3):
                 held = tape[H_GUESS] + tape[contact + 19] + axis
                 store(s, tape[contact + 23] + axis, load(s, held))
-        k += 4 + 4 * tape[k + 3]
+        k += 5 + 4 * tape[k + 4]
     _stick(tape, s, skip)
     bad = _violated(tape, s, skip, velocity)
     stuck = zero > zero
     if any_lane(bad):
         _put_back(tape, s, skip, bad)
-        stuck = bad
-        if tape[H_DENSE] >= 0:
-            stuck = newton(tape, s, skip, velocity, bad)
-            _put_back(tape, s, skip, stuck)
-        if any_lane(stuck):
-            stuck = _sweep(tape, s, skip, velocity, stuck)
+        for _ in range(_ANCHORS):
+            _anchor(tape, s, skip)
+            stuck = bad
+            if tape[H_DENSE] >= 0:
+                stuck = newton(tape, s, skip, velocity, bad)
+            if any_lane(stuck):
+                stuck = _sweep(tape, s, skip, velocity, stuck)
     for index in range(tape[at]):
         contact = at + 1 + CONTACT * index
         if skip[tape[contact + 20]] == 0:

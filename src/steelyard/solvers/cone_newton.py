@@ -5,36 +5,53 @@ Alart & Curnier (1991): with u = W l - b and per-contact scales r_n, r_t, the la
     l_n = max(0, l_n - r_n u_n),    l_t = projection of (l_t - r_t u_t) on the disc of radius mu l_n,
 
 a piecewise smooth equation. Each contact is open, sticks or slides at the present guess; that choice gives
-three rows of a dense system, solved by elimination. A little on the diagonal gives redundant friction a
-pivot, so that it stays as it is. Converges in a few iterations from the last step's impulses; where it does not, sweeps follow.
+three rows of a dense system, solved by elimination. Contacts joined by links share their load in more ways
+than one: a little softness, u + e (l - l0) for u makes the answer unique, and solving again from l0 = l takes it
+out (the proximal point method). Converges in a few iterations from the last step's impulses; where it does not, sweeps follow.
 """
 
 from __future__ import annotations
 
-from ..kernel import kernel
+from ..kernel import inner
 from ..math.lanes import absolute, any_lane, fma, load, select, splat, sqrt, store
 from ..model.tape import CONTACT, H_CONTACT_PRODUCTS, H_CONTACTS, H_DENSE, H_GUESS, H_RIGHT
 from .cone_rows import add_motion_row, relative_motion
 
 _ITERATIONS = 15
-_SOFTNESS = 1e-7
-_SETTLED = 1e-12
+#: Compliance of contacts, as a share of the inverse mass they act on; taken out again by repetition.
+SOFTNESS = 1e-5
+_SETTLED = 1e-11
 
 
-@kernel
-def _scales(s, w):
+@inner
+def softened_motion(tape, s, skip, contact, k):
+    """W l - b + e (l - l0) of one contact at the guess: three lane vectors."""
+    soft = splat(SOFTNESS) * load(s, tape[k + 3])
+    slot = tape[contact + 19]
+    guess = tape[H_GUESS] + slot
+    right = tape[H_RIGHT] + slot
+    anchor = tape[contact + 23] + 3
+    a, b, c = relative_motion(tape, s, skip, k, tape[H_GUESS])
+    a = fma(soft, load(s, guess) - load(s, anchor), a - load(s, right))
+    b = fma(soft, load(s, guess + 1) - load(s, anchor + 1), b - load(s, right + 1))
+    c = fma(soft, load(s, guess + 2) - load(s, anchor + 2), c - load(s, right + 2))
+    return a, b, c
+
+
+@inner
+def _scales(s, w, soft):
     """r_n and r_t: inverses of the contact's own stiffness of motion."""
     zero = splat(0.0)
     one = splat(1.0)
-    w00 = load(s, w)
-    w11 = load(s, w + 2)
-    w22 = load(s, w + 5)
+    w00 = load(s, w) + soft
+    w11 = load(s, w + 2) + soft
+    w22 = load(s, w + 5) + soft
     size = select(w11 > w22, w11, w22) + absolute(load(s, w + 4))
     normal = select(w00 > zero, one / w00, zero)
     return normal, select(size > zero, one / size, zero)
 
 
-@kernel
+@inner
 def _contact_system(tape, s, skip, contact, k, velocity, first, width):
     """Three rows of the system for one contact; its error and the size of its impulse."""
     zero = splat(0.0)
@@ -42,19 +59,16 @@ def _contact_system(tape, s, skip, contact, k, velocity, first, width):
     half = splat(0.5)
     slot = tape[contact + 19]
     guess = tape[H_GUESS] + slot
-    right = tape[H_RIGHT] + slot
     row = tape[H_DENSE] + (slot - first) * width
     last = width - 1
     for entry in range(3 * width):
         store(s, row + entry, zero)
-    a, b, c = relative_motion(tape, s, skip, k, tape[H_GUESS])
-    un = a - load(s, right)
-    ut = b - load(s, right + 1)
-    uu = c - load(s, right + 2)
+    un, ut, uu = softened_motion(tape, s, skip, contact, k)
     n = load(s, guess)
     t = load(s, guess + 1)
     u = load(s, guess + 2)
-    rn, rt = _scales(s, tape[k + 1])
+    soft = splat(SOFTNESS) * load(s, tape[k + 3])
+    rn, rt = _scales(s, tape[k + 1], soft)
     possible = load(s, tape[contact + 18]) > half
     loads = n - rn * un > zero
     if velocity:
@@ -64,7 +78,7 @@ def _contact_system(tape, s, skip, contact, k, velocity, first, width):
     # Normal: u_n = 0 where closed, l_n = 0 where open.
     own = row + slot - first
     add_motion_row(tape, s, skip, k, 0, row, closed * rn, first)
-    store(s, own, load(s, own) + open_)
+    store(s, own, load(s, own) + fma(closed * rn, soft, open_))
     normal_error = select(closed > half, rn * un, n)
     store(s, row + last, zero - normal_error)
     # Tangents: where they slide, l_t = mu l_n e with e the direction of l_t - r_t u_t.
@@ -84,7 +98,6 @@ def _contact_system(tape, s, skip, contact, k, velocity, first, width):
     k00 = share * p00
     k01 = share * p01
     k11 = share * p11
-    soft = splat(1.0 + _SOFTNESS)
     next_ = row + width
     other = next_ + width
     add_motion_row(tape, s, skip, k, 1, next_, rt * k00, first)
@@ -92,12 +105,12 @@ def _contact_system(tape, s, skip, contact, k, velocity, first, width):
     add_motion_row(tape, s, skip, k, 1, other, rt * k01, first)
     add_motion_row(tape, s, skip, k, 2, other, rt * k11, first)
     own = next_ + slot - first
-    store(s, own + 1, load(s, own + 1) + soft - k00)
-    store(s, own + 2, load(s, own + 2) - k01)
+    store(s, own + 1, load(s, own + 1) + one - k00 + rt * k00 * soft)
+    store(s, own + 2, load(s, own + 2) - k01 + rt * k01 * soft)
     store(s, own, load(s, own) - select(slides, friction * et, zero))
     own = other + slot - first
-    store(s, own + 1, load(s, own + 1) - k01)
-    store(s, own + 2, load(s, own + 2) + soft - k11)
+    store(s, own + 1, load(s, own + 1) - k01 + rt * k01 * soft)
+    store(s, own + 2, load(s, own + 2) + one - k11 + rt * k11 * soft)
     store(s, own, load(s, own) - select(slides, friction * eu, zero))
     sticks = closed > half
     error_t = select(slides, t - bound * et, select(sticks, rt * ut, t))
@@ -108,7 +121,7 @@ def _contact_system(tape, s, skip, contact, k, velocity, first, width):
     return error, absolute(n) + absolute(t) + absolute(u)
 
 
-@kernel
+@inner
 def _eliminate(s, dense, size):
     """Solve the dense system in place, last column the right side."""
     zero = splat(0.0)
@@ -135,7 +148,7 @@ def _eliminate(s, dense, size):
         store(s, row + size, value)
 
 
-@kernel
+@inner
 def newton(tape, s, skip, velocity, worlds):
     """Improve the guess rows of ``worlds``; the worlds that still miss the law afterwards."""
     zero = splat(0.0)
@@ -162,7 +175,7 @@ def newton(tape, s, skip, velocity, worlds):
                     store(s, row + entry, zero)
                 for axis in range(3):
                     store(s, row + axis * width + 3 * index + axis, one)
-            k += 4 + 4 * tape[k + 3]
+            k += 5 + 4 * tape[k + 4]
         moving = moving & (error > splat(_SETTLED) * largest)
         if turn == _ITERATIONS or not any_lane(moving):
             break

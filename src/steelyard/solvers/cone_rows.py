@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from ..kernel import kernel
+from ..kernel import inner
 from ..math.lanes import fma, load, store
 
 
-@kernel
+@inner
 def relative_motion(tape, s, skip, k, source):
     """(W l)_c for the contact whose product record starts at ``k``: three lane vectors.
 
-    Record: slot, diagonal six rows, block, count, then per other contact: nine rows, its slot, whether
-    transposed, its block. ``source`` is the first row of l by slot.
+    Record: slot, diagonal six rows, block, row of the softness, count, then per other contact: nine rows, its
+    slot, whether transposed, its block. ``source`` is the first row of l by slot.
     """
     slot = source + tape[k]
     w = tape[k + 1]
@@ -21,8 +21,8 @@ def relative_motion(tape, s, skip, k, source):
     a = fma(load(s, w + 3), u, fma(load(s, w + 1), t, load(s, w) * n))
     b = fma(load(s, w + 4), u, fma(load(s, w + 2), t, load(s, w + 1) * n))
     c = fma(load(s, w + 5), u, fma(load(s, w + 4), t, load(s, w + 3) * n))
-    for other in range(tape[k + 3]):
-        o = k + 4 + 4 * other
+    for other in range(tape[k + 4]):
+        o = k + 5 + 4 * other
         if skip[tape[o + 3]] == 0:
             m = tape[o]
             x = source + tape[o + 1]
@@ -40,7 +40,7 @@ def relative_motion(tape, s, skip, k, source):
     return a, b, c
 
 
-@kernel
+@inner
 def add_motion_row(tape, s, skip, k, axis, row, factor, first):
     """row += factor times row ``axis`` of (W)_c; columns are slots less ``first``."""
     w = tape[k + 1]
@@ -49,8 +49,8 @@ def add_motion_row(tape, s, skip, k, axis, row, factor, first):
         high = max(axis, column)
         entry = high * (high + 1) // 2 + min(axis, column)
         store(s, own + column, fma(factor, load(s, w + entry), load(s, own + column)))
-    for other in range(tape[k + 3]):
-        o = k + 4 + 4 * other
+    for other in range(tape[k + 4]):
+        o = k + 5 + 4 * other
         if skip[tape[o + 3]] == 0:
             at = row + tape[o + 1] - first
             for column in range(3):

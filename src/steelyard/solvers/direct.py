@@ -26,7 +26,7 @@ from ..constraints.links import (
     link_rate,
 )
 from ..constraints.riders import DECK, HEAD, rider_multiplier, rider_offset, rider_slip
-from ..kernel import kernel
+from ..kernel import inner
 from ..math.lanes import absolute, any_lane, fma, load, select, splat, store
 from ..model.tape import (
     CONTACT,
@@ -59,7 +59,7 @@ from ..model.tape import (
 )
 from . import block_ldl
 from .base import Solver
-from .cone import solve_contacts
+from .cone import factorise_contacts, solve_contacts
 from .gather import clear_velocity_multipliers, gather
 
 _FREE_CHANGES = 10
@@ -79,7 +79,7 @@ class Direct(Solver):
     code: ClassVar[int] = DIRECT
 
 
-@kernel
+@inner
 def assemble(tape, s):
     """Matrix A = J M^-1 J^T of all blocks from the stored gradients, frames and weights."""
     zero = splat(0.0)
@@ -141,7 +141,7 @@ def assemble(tape, s):
                 store(s, tape[k] + 3 * row + column, fma(z, load(s, g + 2), value))
 
 
-@kernel
+@inner
 def factorise(tape, s, skip):
     """Mask slack cables, keep the diagonal as pivots' reference, and factorise all but W."""
     one = splat(1.0)
@@ -166,7 +166,7 @@ def factorise(tape, s, skip):
             store(s, tape[H_USED_MASK] + slot, load(s, tape[H_MASK] + slot))
 
 
-@kernel
+@inner
 def _set_changed(tape, s):
     """Whether a cable's state differs, in any world, from that of the present factor."""
     at = tape[H_LINKS]
@@ -180,14 +180,14 @@ def _set_changed(tape, s):
     return False
 
 
-@kernel
+@inner
 def refactor(tape, s, skip):
     """Gradients are those stored; assemble and factorise anew."""
     assemble(tape, s)
     factorise(tape, s, skip)
 
 
-@kernel
+@inner
 def _contact_rows(tape, s, skip, velocity):
     """Right-hand sides of the contacts: minus the relative motion still unwanted."""
     zero = splat(0.0)
@@ -207,7 +207,7 @@ def _contact_rows(tape, s, skip, velocity):
                 store(s, slot + 2, zero - contact_shift(s, tape, contact, 2))
 
 
-@kernel
+@inner
 def _contact_start(tape, s, skip, velocity):
     """First guess: the multipliers at hand; loaded contacts and those about to close are taken to stick."""
     zero = splat(0.0)
@@ -239,7 +239,7 @@ def _contact_start(tape, s, skip, velocity):
                 store(s, tape[H_GUESS] + slot + axis, value)
 
 
-@kernel
+@inner
 def _link_start(tape, s, velocity):
     """First active set: rods, and cables that carried tension (or, for velocities, are held)."""
     zero = splat(0.0)
@@ -258,7 +258,7 @@ def _link_start(tape, s, velocity):
             store(s, tape[H_MASK] + slot, taut)
 
 
-@kernel
+@inner
 def _link_error(tape, s, link, velocity, dt):
     """How far a link is from where it must be, and the error allowed (both in the units of g or its rate)."""
     length = load(s, tape[link + 8])
@@ -268,45 +268,92 @@ def _link_error(tape, s, link, velocity, dt):
     return link_half_square(s, link, tape, length), allowed
 
 
-@kernel
-def _update_set(tape, s, velocity, dt, single):
-    """Flip cables that push or overstretch; all at once, or the lowest only. True if one was let go."""
+@inner
+def _pushing(tape, s, velocity):
+    """Worlds in which a taut cable pushes."""
+    zero = splat(0.0)
+    half = splat(0.5)
+    pushing = zero > zero
+    at = tape[H_LINKS]
+    for index in range(tape[at]):
+        link = at + 1 + LINK * index
+        if tape[link + 10] != 0:
+            taut = load(s, tape[H_MASK] + tape[link + 15]) > half
+            lets_go = taut & (load(s, link_multiplier(tape, link, velocity)) < zero)
+            if velocity:
+                lets_go = lets_go & (load(s, tape[link + 14] + 1) < half)
+            pushing = pushing | lets_go
+    return pushing
+
+
+@inner
+def _withdraw(tape, s, skip, velocity, worlds, single):
+    """Undo the last pass where a cable pushes, and let those cables go, all or the lowest only."""
     zero = splat(0.0)
     one = splat(1.0)
     half = splat(0.5)
-    released = False
     flipped = zero > zero
+    at = tape[H_LINKS]
+    for index in range(tape[at]):
+        link = at + 1 + LINK * index
+        row = link_multiplier(tape, link, velocity)
+        value = load(s, row)
+        before = load(s, tape[link + 14] + 3)
+        if tape[link + 10] != 0:
+            slot = tape[H_MASK] + tape[link + 15]
+            lets_go = (load(s, slot) > half) & (value < zero)
+            if velocity:
+                lets_go = lets_go & (load(s, tape[link + 14] + 1) < half)
+            if single:
+                lets_go = lets_go & (select(flipped, zero, one) > half)
+                flipped = flipped | lets_go
+            store(s, slot, select(lets_go, zero, load(s, slot)))
+            before = select(lets_go, zero, before)
+        store(s, row, select(worlds, before, value))
+    at = tape[H_RIDERS] + 1
+    for _ in range(tape[tape[H_RIDERS]]):
+        row = rider_multiplier(tape, at, velocity)
+        old = tape[at + 9] + tape[at + 6] + 3
+        for axis in range(3):
+            store(s, row + axis, select(worlds, load(s, old + axis), load(s, row + axis)))
+        at += HEAD + DECK * tape[at + 6]
+    at = tape[H_CONTACTS]
+    for index in range(tape[at]):
+        contact = at + 1 + CONTACT * index
+        if skip[tape[contact + 20]] == 0:
+            row = contact_multiplier(tape, contact, velocity)
+            guess = tape[H_GUESS] + tape[contact + 19]
+            for axis in range(3):
+                value = select(worlds, load(s, tape[contact + 23] + axis), load(s, row + axis))
+                store(s, row + axis, value)
+                store(s, guess + axis, value)
+
+
+@inner
+def _tighten(tape, s, velocity, dt, worlds, single):
+    """Take up slack cables that overstretch, all or the lowest only. Worlds that changed."""
+    zero = splat(0.0)
+    one = splat(1.0)
+    half = splat(0.5)
+    changed = zero > zero
     at = tape[H_LINKS]
     for index in range(tape[at]):
         link = at + 1 + LINK * index
         if tape[link + 10] != 0:
             slot = tape[H_MASK] + tape[link + 15]
-            row = link_multiplier(tape, link, velocity)
-            taut = load(s, slot) > half
-            slack = load(s, slot) < half
             error, allowed = _link_error(tape, s, link, velocity, dt)
-            lets_go = taut & (load(s, row) < zero)
+            tightens = worlds & (load(s, slot) < half) & (error > allowed)
             if velocity:
                 held = load(s, tape[link + 14] + 1) > half
-                lets_go = lets_go & (load(s, tape[link + 14] + 1) < half)
-                closed = (load(s, tape[link + 12]) > zero) | held
-                tightens = slack & closed & (error > allowed)
-            else:
-                tightens = slack & (error > allowed)
-            changes = lets_go | tightens
+                tightens = tightens & ((load(s, tape[link + 12]) > zero) | held)
             if single:
-                free = select(flipped, zero, one) > half
-                changes = changes & free
-                lets_go = lets_go & free
-                flipped = flipped | changes
-            if any_lane(changes):
-                store(s, slot, select(changes, one - load(s, slot), load(s, slot)))
-                store(s, row, select(lets_go, zero, load(s, row)))
-                released = released or any_lane(lets_go)
-    return released
+                tightens = tightens & (select(changed, zero, one) > half)
+            store(s, slot, select(tightens, one, load(s, slot)))
+            changed = changed | tightens
+    return changed
 
 
-@kernel
+@inner
 def _right_rows(tape, s, velocity, dt):
     """Right-hand sides of links and riders; worlds that still miss the tolerance."""
     zero = splat(0.0)
@@ -336,7 +383,7 @@ def _right_rows(tape, s, velocity, dt):
     return bad
 
 
-@kernel
+@inner
 def _accept(tape, s, skip, velocity, worlds):
     """Add the solved changes to the multipliers of the worlds that take part."""
     zero = splat(0.0)
@@ -346,12 +393,14 @@ def _accept(tape, s, skip, velocity, worlds):
         slot = tape[link + 15]
         if slot >= 0:
             row = link_multiplier(tape, link, velocity)
+            store(s, tape[link + 14] + 3, load(s, row))
             change = load(s, tape[H_RIGHT] + slot) * load(s, tape[H_MASK] + slot)
             store(s, row, load(s, row) + select(worlds, change, zero))
     at = tape[H_RIDERS] + 1
     for _ in range(tape[tape[H_RIDERS]]):
         row = rider_multiplier(tape, at, velocity)
         for axis in range(3):
+            store(s, tape[at + 9] + tape[at + 6] + 3 + axis, load(s, row + axis))
             change = load(s, tape[H_RIGHT] + tape[at + 4] + axis)
             store(s, row + axis, load(s, row + axis) + select(worlds, change, zero))
         at += HEAD + DECK * tape[at + 6]
@@ -367,13 +416,16 @@ def _accept(tape, s, skip, velocity, worlds):
                 store(s, guess + axis, value)
 
 
-@kernel
+@inner
 def solve_stage(tape, s, skip, velocity, dt, target):
     """One stage: multipliers and the rows ``target`` (positions or velocities) that meet all constraints.
 
     ``target`` starts from the free rows; the stored gradients, frames and weights direct the impulses.
     """
     zero = splat(0.0)
+    # Rows that no constraint uses must stay 0: what a broken world left there would reach the next block.
+    for row in range(tape[H_RIGHT], tape[H_GUESS]):
+        store(s, row, zero)
     if velocity:
         clear_velocity_multipliers(tape, s)
     _link_start(tape, s, velocity)
@@ -382,22 +434,38 @@ def solve_stage(tape, s, skip, velocity, dt, target):
     contacts = tape[tape[H_CONTACTS]]
     bad = zero >= zero
     stuck = zero > zero
+    if contacts > 0:
+        factorise_contacts(tape, s, skip)
     for turn in range(tape[H_PASSES]):
-        if tape[H_CABLES] > 0 and _update_set(tape, s, velocity, dt, turn >= _FREE_CHANGES):
-            gather(tape, s, skip, velocity, target)
-        late = _right_rows(tape, s, velocity, dt)
+        changed = zero > zero
+        if tape[H_CABLES] > 0:
+            single = turn >= _FREE_CHANGES
+            if turn > 0:
+                changed = _pushing(tape, s, velocity) & bad
+                if any_lane(changed):
+                    _withdraw(tape, s, skip, velocity, changed, single)
+                    gather(tape, s, skip, velocity, target)
+            others = select(changed, zero, splat(1.0)) > splat(0.5)
+            changed = changed | _tighten(tape, s, velocity, dt, others, single)
+        # Letting a cable go may stretch another: a world whose set changed has not settled.
+        late = stuck | changed | _right_rows(tape, s, velocity, dt)
         bad = (bad & (zero >= zero)) if turn == 0 and contacts > 0 else late
         if not any_lane(bad):
             break
         if tape[H_CABLES] > 0 and _set_changed(tape, s):
             refactor(tape, s, skip)
+            if contacts > 0:
+                factorise_contacts(tape, s, skip)
         if contacts > 0:
             _contact_rows(tape, s, skip, velocity)
         block_ldl.forward(tape, tape[H_FORWARD], s, skip)
         if contacts > 0:
-            stuck = solve_contacts(tape, s, skip, velocity)
+            stuck = solve_contacts(tape, s, skip, velocity) & bad
         block_ldl.backward(tape, tape[H_BACKWARD], s, skip)
         _accept(tape, s, skip, velocity, bad)
         gather(tape, s, skip, velocity, target)
-    failed = bad | stuck
-    store(s, tape[H_UNSETTLED], select(failed, splat(1.0), load(s, tape[H_UNSETTLED])))
+        if velocity and tape[H_CABLES] == 0 and not any_lane(stuck):
+            # Velocities are linear and nothing can go slack: one solve is exact.
+            bad = stuck
+            break
+    store(s, tape[H_UNSETTLED], select(bad, splat(1.0), load(s, tape[H_UNSETTLED])))

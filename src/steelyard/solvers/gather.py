@@ -5,7 +5,7 @@ from __future__ import annotations
 from ..constraints.contacts import contact_impulses, contact_multiplier
 from ..constraints.links import link_impulses, link_multiplier
 from ..constraints.riders import DECK, HEAD, rider_impulses, rider_multiplier
-from ..kernel import kernel
+from ..kernel import inner
 from ..math.lanes import fma, load, splat, store
 from ..model.tape import (
     CONTACT,
@@ -20,7 +20,7 @@ from ..model.tape import (
 )
 
 
-@kernel
+@inner
 def clear_velocity_multipliers(tape, s):
     """The velocity stage starts from no impulse."""
     zero = splat(0.0)
@@ -38,7 +38,7 @@ def clear_velocity_multipliers(tape, s):
             store(s, contact_multiplier(tape, at + 1 + CONTACT * index, True) + axis, zero)
 
 
-@kernel
+@inner
 def gather(tape, s, skip, velocity, target):
     """Sum all impulses and apply them: rows ``target`` = free rows + M^-1 impulse."""
     zero = splat(0.0)

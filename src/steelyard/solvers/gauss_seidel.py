@@ -14,13 +14,15 @@ from typing import ClassVar
 from ..constraints.contacts import contact_gap, contact_multiplier, contact_shift, contact_speed
 from ..constraints.links import link_half_square, link_multiplier, link_rate
 from ..constraints.riders import DECK, HEAD, rider_multiplier, rider_offset, rider_slip
-from ..kernel import kernel
+from ..kernel import inner
 from ..math.lanes import absolute, fma, load, select, splat, sqrt, store
 from ..model.tape import (
     CONTACT,
     GAUSS_SEIDEL,
     H_CONTACTS,
+    H_IMPULSE,
     H_LINKS,
+    H_PARTICLES,
     H_PASSES,
     H_RIDERS,
     LINK,
@@ -42,7 +44,7 @@ class GaussSeidel(Solver):
     code: ClassVar[int] = GAUSS_SEIDEL
 
 
-@kernel
+@inner
 def _push(s, row, weight, d, change, sign):
     """Add an impulse ``change`` times the vector at ``d`` to a position or velocity."""
     for component in range(3):
@@ -51,7 +53,7 @@ def _push(s, row, weight, d, change, sign):
         store(s, row + component, value + sign * part)
 
 
-@kernel
+@inner
 def _sweep_links(tape, s, velocity):
     """One sweep over the links."""
     zero = splat(0.0)
@@ -88,10 +90,11 @@ def _sweep_links(tape, s, velocity):
         store(s, row, new)
         change = new - old
         _push(s, a, load(s, tape[link + 6]), d, change, zero - one)
-        _push(s, b, load(s, tape[link + 7]), d, change, one)
+        if tape[link + 5] < tape[H_IMPULSE] + 3 * tape[H_PARTICLES]:
+            _push(s, b, load(s, tape[link + 7]), d, change, one)
 
 
-@kernel
+@inner
 def _sweep_riders(tape, s, velocity):
     """One sweep over the riders."""
     zero = splat(0.0)
@@ -119,7 +122,7 @@ def _sweep_riders(tape, s, velocity):
         at += HEAD + DECK * count
 
 
-@kernel
+@inner
 def _sweep_contacts(tape, s, skip, velocity):
     """One sweep over the contacts: normal, then tangents within the friction cone."""
     zero = splat(0.0)
@@ -151,7 +154,9 @@ def _sweep_contacts(tape, s, skip, velocity):
         new = select(possible & (held | (new > zero)), new, zero)
         store(s, row, new)
         _push(s, a, ma, frame, new - old, one)
-        _push(s, b, mb, frame, new - old, zero - one)
+        two = tape[contact + 6] < tape[H_IMPULSE] + 3 * tape[H_PARTICLES]
+        if two:
+            _push(s, b, mb, frame, new - old, zero - one)
         if velocity:
             t = contact_speed(s, tape, contact, 1)
             u = contact_speed(s, tape, contact, 2)
@@ -171,12 +176,14 @@ def _sweep_contacts(tape, s, skip, velocity):
         store(s, row + 1, t)
         store(s, row + 2, u)
         _push(s, a, ma, frame + 3, t - t0, one)
-        _push(s, b, mb, frame + 3, t - t0, zero - one)
+        if two:
+            _push(s, b, mb, frame + 3, t - t0, zero - one)
         _push(s, a, ma, frame + 6, u - u0, one)
-        _push(s, b, mb, frame + 6, u - u0, zero - one)
+        if two:
+            _push(s, b, mb, frame + 6, u - u0, zero - one)
 
 
-@kernel
+@inner
 def sweep_stage(tape, s, skip, velocity, target):
     """One stage by sweeps; contract of ``direct.solve_stage``."""
     if velocity:

@@ -7,13 +7,13 @@ from ..constraints.contacts import contact_targets
 from ..constraints.links import link_gradients, link_targets
 from ..constraints.riders import rider_coefficients
 from ..integrators.motion import add_stage_velocity, keep_free_velocity
-from ..kernel import kernel
+from ..kernel import inner
 from ..model.tape import DIRECT, H_POSITION, H_SOLVER, H_VELOCITY
 from .direct import refactor, solve_stage
 from .gauss_seidel import sweep_stage
 
 
-@kernel
+@inner
 def begin_step(tape, s, skip, dt):
     """At the start of a step: gradients, contact frames, targets of the velocity stage.
 
@@ -26,7 +26,7 @@ def begin_step(tape, s, skip, dt):
     return contact_targets(tape, s, dt, skip)
 
 
-@kernel
+@inner
 def position_stage(tape, s, skip, dt, fresh):
     """Put the drifted positions on the constraints; the velocities take the impulses along.
 
@@ -41,7 +41,7 @@ def position_stage(tape, s, skip, dt, fresh):
     add_stage_velocity(tape, s, dt)
 
 
-@kernel
+@inner
 def velocity_stage(tape, s, skip, dt):
     """Make the velocities follow the constraints at the new positions, impacts included."""
     link_gradients(tape, s)

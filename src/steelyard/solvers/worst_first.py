@@ -6,7 +6,9 @@ by moving the particles in proportion to inverse mass; contacts that share a par
 updated. Added here: Coulomb friction on contacts with scenery and between particles, as an impulse against
 the tangential velocity of at most mu times the normal impulse.
 
-Ties go to the contact generated first. Its error does not fall with iterations; with many it can diverge.
+As in the source, a contact resolved without penetration is taken to have moved its particles by what its place in
+the list moved last, in this step or an earlier one; those moves are part of the state. Ties go to the
+contact generated first. Its error does not fall with iterations; with many it can diverge.
 """
 
 from __future__ import annotations
@@ -15,13 +17,14 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
-from ..kernel import kernel
+from ..kernel import inner
 from ..model.tape import (
     CONTACT,
     H_ACCELERATION,
     H_CONTACTS,
     H_GENERATORS,
     H_LINKS,
+    H_MOVES,
     H_PASSES,
     LINK,
     WORST_FIRST,
@@ -45,7 +48,7 @@ class WorstFirst(Solver):
     code: ClassVar[int] = WORST_FIRST
 
 
-@kernel
+@inner
 def _add(s, record, lane, ends, values, count, nx, ny, nz, depth, restitution, friction):
     """Append a contact; ``ends`` keeps where its record lies on the tape."""
     ends[count] = record
@@ -55,12 +58,10 @@ def _add(s, record, lane, ends, values, count, nx, ny, nz, depth, restitution, f
     values[count, _DEPTH] = depth
     values[count, _RESTITUTION] = restitution
     values[count, _FRICTION] = friction
-    for k in range(6):
-        values[count, _MOVE_A + k] = 0.0
     return count + 1
 
 
-@kernel
+@inner
 def _find(tape, s, lane, ends, values):
     """All contacts of one world, in the order in which their generators were added."""
     count = 0
@@ -81,7 +82,7 @@ def _find(tape, s, lane, ends, values):
             over = size - s[tape[link + 8], lane]
             cable = tape[link + 10] != 0
             if (over >= 0.0 if cable else over != 0.0) and size > 0.0:
-                sign = 1.0 if over > 0.0 else -1.0
+                sign = 1.0 if cable or over > 0.0 else -1.0
                 scale = sign * (1.0 / size)
                 count = _add(
                     s,
@@ -119,7 +120,7 @@ def _find(tape, s, lane, ends, values):
     return count
 
 
-@kernel
+@inner
 def _separation(s, lane, va, vb, values, c):
     """Separating velocity along the normal."""
     x = s[va, lane] - s[vb, lane]
@@ -128,7 +129,7 @@ def _separation(s, lane, va, vb, values, c):
     return x * values[c, _NX] + y * values[c, _NY] + z * values[c, _NZ]
 
 
-@kernel
+@inner
 def _rows(tape, links_end, record):
     """Rows (xa, xb, va, vb, ma, mb) of a link or contact record."""
     if record < links_end:
@@ -150,7 +151,7 @@ def _rows(tape, links_end, record):
     )
 
 
-@kernel
+@inner
 def _resolve(tape, s, lane, position, zero_row, rows, values, c, dt):
     """Velocity, friction and penetration of one contact."""
     xa, xb, va, vb, ma, mb = rows
@@ -197,8 +198,6 @@ def _resolve(tape, s, lane, position, zero_row, rows, values, c, dt):
                     if inverse_b > 0.0:
                         s[vb + k, lane] += part * brake * inverse_b
     depth = values[c, _DEPTH]
-    for k in range(6):
-        values[c, _MOVE_A + k] = 0.0
     if depth > 0.0:
         for k in range(3):
             move = values[c, k] * (depth / total)
@@ -207,9 +206,11 @@ def _resolve(tape, s, lane, position, zero_row, rows, values, c, dt):
             if inverse_b > 0.0:
                 values[c, _MOVE_B + k] = move * -inverse_b
                 s[xb + k, lane] += move * -inverse_b
+            else:
+                values[c, _MOVE_B + k] = 0.0
 
 
-@kernel
+@inner
 def resolve_worst_first(tape, s, lane, ends, values, position, zero_row, dt):
     """Resolve the contacts of one world of the block.
 
@@ -219,6 +220,10 @@ def resolve_worst_first(tape, s, lane, ends, values, position, zero_row, dt):
         position: first row of the positions.
         zero_row: rows from here on are no particle's.
     """
+    moves = tape[H_MOVES]
+    for c in range(values.shape[0]):
+        for k in range(6):
+            values[c, _MOVE_A + k] = s[moves + 6 * c + k, lane]
     count = _find(tape, s, lane, ends, values)
     links = tape[H_LINKS]
     links_end = links + 1 + LINK * tape[links]
@@ -252,3 +257,6 @@ def resolve_worst_first(tape, s, lane, ends, values, position, zero_row, dt):
                     for k in range(3):
                         along += values[worst, moved + k] * values[c, k]
                     values[c, _DEPTH] += along if end == 1 else -along
+    for c in range(values.shape[0]):
+        for k in range(6):
+            s[moves + 6 * c + k, lane] = values[c, _MOVE_A + k]

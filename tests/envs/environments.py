@@ -1,0 +1,55 @@
+"""Every registered environment, and ways to play it whose outcomes compare bit for bit."""
+
+import gymnasium as gym
+import numpy as np
+from gymnasium.envs.registration import load_env_creator
+
+from steelyard_envs.registration import ENVIRONMENTS
+
+IDS = tuple(row[0] for row in ENVIRONMENTS)
+
+
+def task_class(env_id):
+    return load_env_creator(gym.spec(env_id).entry_point).task_class
+
+
+def variants():
+    """Every id with every level of difficulty and every method."""
+    return [
+        (env_id, difficulty, method)
+        for env_id in IDS
+        for difficulty in task_class(env_id).levels
+        for method in task_class(env_id).methods
+    ]
+
+
+def some_actions(env_id, steps, *, rows=None, seed=0, hold=10):
+    """Random actions, each held for some steps, as white noise hardly moves anything.
+
+    Shape (steps, actions), or (steps, rows, actions).
+    """
+    row = task_class(env_id).action_space().shape
+    shape = row if rows is None else (rows, *row)
+    blocks = np.random.default_rng(seed).uniform(-1.0, 1.0, (-(-steps // hold), *shape))
+    return np.repeat(blocks, hold, axis=0)[:steps].astype(np.float32)
+
+
+def begin(env, **kwargs):
+    observation, info = env.reset(**kwargs)
+    return observation.tobytes(), tuple(info.items())
+
+
+def go_on(env, actions):
+    """Outcomes of steps, and of a reset without a seed after each episode."""
+    outcomes = []
+    for action in actions:
+        observation, *ending, info = env.step(action)
+        outcomes.append((observation.tobytes(), *ending, tuple(info.items())))
+        if ending[1] or ending[2]:
+            outcomes.append(begin(env))
+    return outcomes
+
+
+def play(env, actions, *, seed):
+    """Outcomes of a seeded reset and all that follows."""
+    return [begin(env, seed=seed), *go_on(env, actions)]

@@ -1,0 +1,567 @@
+"""Ballistic's own rules: the flight, hits on the swept path, the gun, what is seen, how it ends."""
+
+import math
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq, minimize_scalar
+
+import steelyard as sy
+from steelyard_agents.controllers.ballistic import BallisticController
+from steelyard_envs import ballistic_flight as flight
+from steelyard_envs import ballistic_kernels as kernels
+from steelyard_envs.ballistic import BallisticTask
+from steelyard_envs.rendering import Camera
+from steelyard_envs.task import SUCCESS, TERMINATED, TRUNCATED
+from tests.envs.pictures import picture, pixel_of
+
+ID = "steelyard/Ballistic-v0"
+DT = 0.02
+FIRE, HOLD = np.array([[0, 0, 1]], np.float32), np.array([[0, 0, -1]], np.float32)
+GRAVITY = -20.0  # of the artillery's shot
+SPEED = 50.0
+
+
+def begun(worlds=1, *, seed=0, **kwargs):
+    task = BallisticTask(worlds, **kwargs)
+    task.seed(np.ones(worlds, bool), np.arange(worlds) + seed)
+    task.start(np.ones(worlds, bool))
+    return task
+
+
+def lay(task, *, azimuth=0.0, elevation=0.0, wind=(0.0, 0.0)):
+    task.values[kernels.AZIMUTH], task.values[kernels.ELEVATION] = azimuth, elevation
+    task.values[kernels.WIND_X], task.values[kernels.WIND_Z] = wind
+
+
+def put_target(task, place, *, radius=None, travel=(0.0, 0.0), weave=(0.0, 0.0), angle=0.0):
+    rows = (flight.TARGET, place), (flight.TRAVEL, travel), (flight.WEAVE, weave)
+    for row, value in rows:
+        for c, component in enumerate(value):
+            task.flight[row + c] = component
+    task.flight[flight.ANGLE] = angle
+    if radius is not None:
+        task.settings[kernels.RADIUS] = radius
+
+
+def fire_and_wait(task, steps=260):
+    """Events of a shot, (steps, worlds); a flight ends within 250 steps."""
+    worlds = task.num_envs
+    events = np.zeros((steps, worlds))
+    for k in range(steps):
+        task.step(np.repeat(FIRE if k == 0 else HOLD, worlds, axis=0))
+        events[k] = task.flight[flight.EVENT, :worlds]
+    return events
+
+
+def flown(time, *, azimuth, elevation, wind, damping, speed=SPEED, gravity=GRAVITY):
+    """Place (..., 3) of a shot after a time (...), written down anew."""
+    c = -math.log(damping)
+    time = np.asarray(time)[..., None]
+    phi1 = -np.expm1(-c * time) / c
+    velocity = speed * np.array(
+        [math.cos(elevation) * math.sin(azimuth), math.sin(elevation),
+         math.cos(elevation) * math.cos(azimuth)]
+    )  # fmt: skip
+    pull = np.array([c * wind[0], gravity, c * wind[1]])
+    return np.array([0.0, 1.5, 0.0]) + velocity * phi1 + pull * (time - phi1) / c
+
+
+AIM = {"azimuth": 0.3, "elevation": 0.6, "wind": (-7.0, 9.0)}
+
+
+# The flight
+
+
+@pytest.mark.parametrize("control_rate", [50, 10])
+def test_wind_and_drag_in_closed_form(control_rate):
+    task = begun(control_rate=control_rate)
+    lay(task, **AIM)
+    put_target(task, (0.0, 5.0, -50.0))
+    for k in range(2 * control_rate):
+        task.step(HOLD if k else FIRE)
+        place = task.world.particles.position[0, 0]
+        np.testing.assert_allclose(
+            place, flown((k + 1) / control_rate, **AIM, damping=0.9), rtol=0, atol=1e-12
+        )
+
+
+def test_drag_is_relative_to_the_air():
+    """Against the equation of motion itself, integrated to 1e-12."""
+    wind, drag = np.array([-7.0, 0.0, 9.0]), -math.log(0.9)
+
+    def motion(_, y):
+        return [*y[3:], *(np.array([0.0, GRAVITY, 0.0]) - drag * (y[3:] - wind))]
+
+    start = SPEED * np.array(
+        [math.cos(0.6) * math.sin(0.3), math.sin(0.6), math.cos(0.6) * math.cos(0.3)]
+    )
+    wanted = solve_ivp(
+        motion, (0.0, 2.0), [0.0, 1.5, 0.0, *start], method="DOP853", rtol=1e-12, atol=1e-12
+    ).y[:, -1]
+    task = begun()
+    lay(task, **AIM)
+    put_target(task, (0.0, 5.0, -50.0))
+    fire_and_wait(task, 100)
+    particles = task.world.particles
+    np.testing.assert_allclose(particles.position[0, 0], wanted[:3], rtol=0, atol=1e-9)
+    np.testing.assert_allclose(particles.velocity[0, 0], wanted[3:], rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("damping", [0.5, 0.9, 0.99, 1.0])
+def test_lands_where_flight_impact_says(damping):
+    task = begun(damping=damping)
+    lay(task, **AIM)
+    put_target(task, (0.0, 5.0, -50.0))
+    events = fire_and_wait(task)
+    drag = -math.log(damping)
+    velocity = flown(1.0, azimuth=0.3, elevation=0.6, wind=(0, 0), damping=1 - 1e-16, gravity=0)
+    time, place = sy.flight_impact(
+        [0.0, 1.5, 0.0], velocity - [0.0, 1.5, 0.0],
+        acceleration=(drag * -7.0, GRAVITY, drag * 9.0), damping=damping,
+    )  # fmt: skip
+    assert np.flatnonzero(events[:, 0]) == [math.floor(time / DT)]
+    np.testing.assert_allclose(task.flight[flight.MARK : flight.MARK + 3, 0], place, atol=2e-12)
+
+
+@pytest.mark.parametrize(
+    ("method", "rate", "low", "high"),
+    [
+        ("closed_form", 50, 0.0, 1e-12),
+        ("rattle", 50, 1.0e-5, 1.2e-5),
+        ("rattle", 200, 6e-7, 8e-7),
+        ("source", 50, 0.4, 0.6),
+        ("source", 200, 0.1, 0.15),
+    ],
+)
+def test_measured_error_of_methods(method, rate, low, high):
+    """The figures of the docstring: greatest error of a shot's place in 2.5 s of flight."""
+    task = begun(method=method, physics_rate=rate)
+    lay(task, **AIM)
+    put_target(task, (0.0, 5.0, -50.0))
+    worst = 0.0
+    for k in range(125):
+        task.step(HOLD if k else FIRE)
+        error = task.world.particles.position[0, 0] - flown((k + 1) * DT, **AIM, damping=0.9)
+        worst = max(worst, float(np.linalg.norm(error)))
+    print(f"{method} at {rate} Hz: {worst:.2e} m")
+    assert low <= worst <= high
+
+
+@pytest.mark.parametrize("method", BallisticTask.methods)
+def test_a_parked_shot_stays_where_it_is(method):
+    task = begun(5, method=method)
+    lay(task, wind=(3.0, 8.0))
+    for _ in range(50):
+        task.step(np.repeat(HOLD, 5, axis=0))
+    assert (task.world.particles.position == [0.0, 1.5, 0.0]).all()
+    assert (task.world.particles.velocity == 0.0).all()
+    assert (task.observations[:, 11:19] == 0.0).all()
+
+
+# Hits
+
+
+def test_a_fast_shot_cannot_pass_through_a_small_target():
+    """100 m/s is 2 m a step; a target of 4 cm lies anywhere between two steps."""
+    task = begun(41, shot="laser", damping=1.0)
+    lay(task)
+    depth = 40.0 + np.linspace(0.0, 2.0, 41)
+    put_target(task, (0.0, 1.5, 0.0), radius=0.02)
+    task.flight[flight.TARGET + 2, :41] = depth
+    events = fire_and_wait(task, 30)
+    assert (events.max(axis=0) == flight.HIT).all()
+    steps = 2.0 * np.arange(31)
+    assert (np.abs(depth[:, None] - steps).min(axis=1) > 0.02).sum() == 39
+    # The shot stops on the surface.
+    np.testing.assert_allclose(task.flight[flight.MARK + 2, :41], depth - 0.02, atol=1e-12)
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+@pytest.mark.parametrize(
+    ("share", "event"), [(1.0 - 1e-9, flight.HIT), (1.0 + 1e-9, flight.MISSED)]
+)
+def test_grazing(share, event, side):
+    """A straight shot past a target: what counts is the radius, to nine digits."""
+    task = begun(shot="laser", damping=1.0)
+    lay(task)
+    put_target(task, (side * share * 0.1, 1.5, 51.234), radius=0.1)
+    events = fire_and_wait(task)
+    assert events.max() == event
+    assert task.flight[flight.CLOSEST, 0] == pytest.approx((share * 0.1) ** 2, rel=1e-12)
+
+
+def random_meetings(worlds):
+    """Shots and weaving targets that nearly meet at a random time of the flight."""
+    random = np.random.default_rng(5)
+    task = begun(worlds, seed=9, difficulty=3)
+    radius = task.settings[kernels.RADIUS]
+    cases = []
+    for w in range(worlds):
+        aim = {
+            "azimuth": random.uniform(-0.6, 0.6), "elevation": random.uniform(0.1, 0.9),
+            "wind": random.uniform(-10.0, 10.0, 2),
+        }  # fmt: skip
+        down = brentq(lambda t, aim=aim: flown(t, **aim, damping=0.9)[1], 0.1, 10.0, xtol=1e-15)
+        meet = down * random.uniform(0.6, 1.0)
+        offset = random.normal(size=3)
+        offset *= random.uniform(0.0, 1.5) * radius / np.linalg.norm(offset)
+        travel, weave = random.uniform(-9.0, 9.0, 2), random.uniform(-2.0, 2.0, 2)
+        angle, rate = random.uniform(0.0, 6.0), task.settings[kernels.WEAVE_RATE]
+        centre = flown(meet, **aim, damping=0.9) + offset
+        start = centre - [1, 0, 1] * np.array([travel[0], 0.0, travel[1]]) * meet
+        start -= np.array([weave[0], 0.0, weave[1]]) * math.sin(angle + rate * meet)
+        cases.append((aim, down, start, travel, weave, angle))
+        task.values[[kernels.AZIMUTH, kernels.ELEVATION], w] = aim["azimuth"], aim["elevation"]
+        task.values[[kernels.WIND_X, kernels.WIND_Z], w] = aim["wind"]
+        rows = slice(flight.TARGET, flight.ANGLE + 1)
+        task.flight[rows, w] = [*start, *travel, *weave, angle]
+    return task, cases
+
+
+def test_hits_against_a_dense_search():
+    """Closest approach and first touch of 200 meetings, found by sampling at 0.1 ms and refining."""
+    task, cases = random_meetings(200)
+    radius, rate = task.settings[kernels.RADIUS], task.settings[kernels.WEAVE_RATE]
+    events = fire_and_wait(task).max(axis=0)
+    hits = 0
+    for w, (aim, down, start, travel, weave, angle) in enumerate(cases):
+
+        def centre(t, start=start, travel=travel, weave=weave, angle=angle):
+            t = np.asarray(t)[..., None]
+            way = travel * t + weave * np.sin(angle + rate * t)
+            return start + way[..., [0, 0, 1]] * [1.0, 0.0, 1.0]
+
+        def distance(t, aim=aim, centre=centre):
+            return np.linalg.norm(flown(t, **aim, damping=0.9) - centre(t), axis=-1)
+
+        times = np.append(np.arange(0.0, down, 1e-4), down)
+        sampled = distance(times)
+        k = int(sampled.argmin())
+        around = times[max(k - 1, 0)], times[min(k + 1, len(times) - 1)]
+        found = minimize_scalar(distance, bounds=around, method="bounded", options={"xatol": 1e-12})
+        least = min(found.fun, sampled[k])
+        assert (events[w] == flight.HIT) == (least <= radius)
+        if least > radius:
+            assert math.sqrt(task.flight[flight.CLOSEST, w]) == pytest.approx(least, abs=1e-9)
+            assert np.linalg.norm(task.flight[flight.MISS : flight.MISS + 3, w]) == pytest.approx(
+                least, abs=1e-9
+            )
+            mark = down
+        else:
+            hits += 1
+            first = int((sampled <= radius).argmax()) if (sampled <= radius).any() else k
+            mark = brentq(
+                lambda t: distance(t) - radius, times[first - 1], times[first], xtol=1e-14
+            )
+        wanted = flown(mark, **aim, damping=0.9)
+        np.testing.assert_allclose(task.flight[flight.MARK : flight.MARK + 3, w], wanted, atol=1e-9)
+    assert 60 < hits < 180
+
+
+def test_no_hit_below_the_ground():
+    """A shot that comes down just ahead of a target half in the ground does not reach it."""
+    task = begun(shot="laser", damping=1.0)
+    down = 1.5 / math.tan(0.1)
+    lay(task, elevation=-0.1)
+    put_target(task, (0.0, -0.1, down + 0.6), radius=0.5)
+    events = fire_and_wait(task, 30)
+    assert events.max() == flight.MISSED
+    np.testing.assert_allclose(
+        task.flight[flight.MARK : flight.MARK + 3, 0], [0, 0, down], atol=1e-12
+    )
+    np.testing.assert_allclose(task.observations[0, 19:22], [-0.6, 0.0, 0.1], atol=1e-6)
+
+
+# The gun
+
+
+def test_rates_are_limited_and_the_barrel_stops():
+    task = begun(3)
+    lay(task)
+    commands = np.array([[9.0, -9.0, -1], [-0.5, 0.5, -1], [np.nan, np.nan, np.nan]], np.float32)
+    task.step(commands)
+    np.testing.assert_allclose(task.observations[:, 0], [DT, -0.5 * DT, 0.0], rtol=1e-6)
+    np.testing.assert_allclose(task.observations[:, 1], [-0.5 * DT, 0.25 * DT, 0.0], rtol=1e-6)
+    assert (task.observations[:, 3] == 6).all()
+    for _ in range(400):
+        task.step(commands)
+    assert task.values[kernels.AZIMUTH, 0] == kernels.AZIMUTH_MOST
+    assert task.values[kernels.AZIMUTH, 1] == -kernels.AZIMUTH_MOST
+    assert task.values[kernels.ELEVATION, 0] == kernels.ELEVATION_LEAST
+    assert task.values[kernels.ELEVATION, 1] == kernels.ELEVATION_MOST
+
+
+def test_a_shot_follows_the_aim_that_was_observed():
+    task = begun(damping=1.0)
+    lay(task, azimuth=0.25, elevation=0.5)
+    put_target(task, (0.0, 5.0, -50.0))
+    task.step(np.array([[1, 1, 1]], np.float32))
+    x, y, z = task.world.particles.position[0, 0]
+    assert math.atan2(x, z) == pytest.approx(0.25, abs=1e-12)
+    assert math.atan2(y - 1.5 - 0.5 * GRAVITY * DT**2, math.hypot(x, z)) == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize(("elevation", "flies"), [(-0.25, 0.12), (0.45, 2.2)])
+def test_reload(elevation, flies):
+    """A shot per second, and none while one flies; six of them."""
+    task = begun()
+    put_target(task, (0.0, 5.0, -50.0))
+    fired = []
+    for k in range(900):
+        lay(task, elevation=elevation)
+        before = task.observations[0].copy()
+        task.step(FIRE)
+        if task.observations[0, 3] < before[3]:
+            fired.append(k)
+            assert before[2] == 0.0 and before[11] == 0.0
+            assert task.observations[0, 2] == pytest.approx(1.0 - DT)
+            assert task.observations[0, 18] == pytest.approx(DT)
+    gaps = np.diff(fired)
+    down = sy.flight_impact(
+        [0.0, 1.5, 0.0], [0.0, SPEED * math.sin(elevation), 0.0],
+        acceleration=(0.0, GRAVITY, 0.0), damping=0.9,
+    )[0]  # fmt: skip
+    assert down == pytest.approx(flies, abs=0.1)
+    assert (gaps == max(50, math.ceil(down / DT))).all() and len(gaps) == 5
+
+
+@pytest.mark.parametrize(("shot", "steps"), [("fireball", 250), ("laser", 100 + 33)])
+def test_shots_end_after_five_seconds_or_two_hundred_metres(shot, steps):
+    task = begun(shot=shot)
+    lay(task, elevation=0.3)
+    put_target(task, (0.0, 5.0, -50.0))
+    events = fire_and_wait(task)
+    assert events.max() == flight.MISSED
+    if shot == "laser":
+        track = [flown(k * DT, azimuth=0, elevation=0.3, wind=(0, 0), damping=0.9, speed=100, gravity=0)
+                 for k in range(251)]  # fmt: skip
+        steps = int(np.argmax([math.hypot(x, z) > 200.0 for x, _, z in track]))
+    assert np.flatnonzero(events[:, 0]) == [steps - 1]
+
+
+# What is seen
+
+
+def test_the_miss_is_in_range_and_across():
+    """Short: where it comes down. Wide: where it passes. Across grows with azimuth."""
+    task = begun(2, damping=1.0)
+    lay(task)
+    task.values[kernels.ELEVATION, :2] = 0.0, 0.2
+    bearing = 0.4
+    task.values[kernels.AZIMUTH, :2] = bearing, bearing + 0.1
+    sight = np.array([math.sin(bearing), math.cos(bearing)])
+    put_target(task, (60.0 * sight[0], 2.0, 60.0 * sight[1]), radius=0.5)
+    fire_and_wait(task)
+    short = SPEED * math.sqrt(2 * 1.5 / -GRAVITY)
+    np.testing.assert_allclose(task.observations[0, 19:22], [short - 60.0, 0.0, -2.0], atol=1e-5)
+    along, across, up = task.observations[1, 19:22]
+    assert 5.0 < across < 7.0 and abs(along) < 3.0 and abs(up) < 3.0
+
+
+def test_what_is_seen_of_a_flight():
+    task = begun(difficulty=2, seed=4)
+    lay(task, **AIM)
+    fire_and_wait(task, 30)
+    azimuth, _, _, _, reach, bearing, height = task.observations[0, :7].astype(float)
+    sight = azimuth + bearing
+    along = np.array([math.sin(sight), 0.0, math.cos(sight)])
+    across = np.array([math.cos(sight), 0.0, -math.sin(sight)])
+    axes = np.array([along, across, [0.0, 1.0, 0.0]])
+    centre = reach * along + [0.0, height, 0.0]
+    particles = task.world.particles
+    wanted = axes @ (particles.position[0, 0] - centre), axes @ particles.velocity[0, 0]
+    np.testing.assert_allclose(task.observations[0, 12:18], np.concatenate(wanted), atol=2e-5)
+    np.testing.assert_allclose(
+        task.observations[0, 9:11], (axes @ [AIM["wind"][0], 0.0, AIM["wind"][1]])[:2], atol=1e-5
+    )
+    assert task.observations[0, 18] == pytest.approx(30 * DT)
+
+
+@pytest.mark.parametrize("difficulty", BallisticTask.levels)
+def test_levels(difficulty):
+    """How the target moves, that it stays in the field, and who sees the wind."""
+    worlds = 100
+    task = begun(worlds, difficulty=difficulty)
+    tracks, speeds = [], []
+    for _ in range(600):
+        row = task.observations.astype(float)
+        sight = row[:, 0] + row[:, 5]
+        sine, cosine = np.sin(sight), np.cos(sight)
+        tracks.append(row[:, 4, None] * np.stack([sine, cosine], axis=1))
+        speeds.append(np.stack([row[:, 7] * sine + row[:, 8] * cosine,
+                                row[:, 7] * cosine - row[:, 8] * sine], axis=1))  # fmt: skip
+        task.step(np.repeat(HOLD, worlds, axis=0))
+    track, speed = np.array(tracks), np.array(speeds)
+    # Central differences of a weave of 2.4 m in 4 s are right to w^3 A h^2 / 6 = 6e-4 m/s; observations
+    # of 80 m in float32 add 1e-5 m over 0.04 s.
+    np.testing.assert_allclose((track[2:] - track[:-2]) / 0.04, speed[1:-1], atol=2e-3)
+    reach = np.linalg.norm(track, axis=2)
+    assert reach.min() > 32.0 * math.cos(0.6) - 2.4 and reach.max() < 80.0 + 2.4
+    bend = np.abs(speed - speed[0]).max(axis=(0, 2))
+    assert [bend.max() < 1e-4, bend.min() > 1.0] == [difficulty < 3, difficulty == 3]
+    assert (np.abs(speed).max() > 1.0) == (difficulty > 1)
+    seen, most = task.observations[:, 9:11], (5.0, 10.0, 15.0)[difficulty - 1]
+    truth = np.hypot(*task.values[[kernels.WIND_X, kernels.WIND_Z], :worlds])
+    assert 0.8 * most < truth.max() <= most
+    np.testing.assert_allclose(np.hypot(*seen.T), truth if difficulty < 3 else 0.0, atol=1e-5)
+
+
+# The episode
+
+
+def test_a_hit_ends_the_episode():
+    task = begun(shot="laser", damping=1.0)
+    lay(task)
+    put_target(task, (0.0, 1.5, 31.0), radius=0.5)
+    for k in range(16):
+        assert not task.flags[:, 0].any()
+        ended = task.step(FIRE)
+        assert ended == (k == 15)
+    assert task.flags[[TERMINATED, TRUNCATED, SUCCESS], 0].tolist() == [True, False, True]
+    assert task.rewards[:, 0].tolist() == [10.0 - 0.005, 10.0, 0.0, 0.0, -0.005]
+
+
+def test_the_last_miss_ends_the_episode():
+    """Not the last shot: it may still hit."""
+    task = begun(max_steps=900)
+    lay(task, elevation=0.45)
+    put_target(task, (0.0, 5.0, -50.0))
+    last = 0
+    for k in range(900):
+        task.step(FIRE)
+        last = k if task.rewards[3, 0] < 0.0 else last
+        assert task.rewards[0, 0] == pytest.approx(task.rewards[1:, 0].sum())
+        if task.flags[TERMINATED, 0]:
+            break
+    assert task.observations[0, 3] == 0.0 and k - last > 100
+    assert not task.flags[SUCCESS, 0] and not task.flags[TRUNCATED, 0]
+    assert task.rewards[2, 0] > 0.0
+
+
+def test_nearer_is_better():
+    task = begun(40)
+    lay(task, elevation=0.3)
+    put_target(task, (0.0, 5.0, 40.0), radius=0.01)
+    task.values[kernels.ELEVATION, :40] = np.linspace(0.1, 1.4, 40)
+    near = np.zeros(40)
+    for k in range(260):
+        task.step(np.repeat(HOLD if k else FIRE, 40, axis=0))
+        near += task.rewards[2]
+    miss = np.sqrt(task.flight[flight.CLOSEST, :40])
+    np.testing.assert_allclose(near, 1.0 / (1.0 + miss / 5.0), rtol=1e-12)
+    assert near.max() > 0.7 and near.min() < 0.3
+
+
+def test_snapshot_in_flight():
+    """Wind acts through parameters that a restored world must get back."""
+    task = begun(3, difficulty=3)
+    lay(task, **AIM)
+    fire_and_wait(task, 40)
+    kept = task.snapshot()
+    ends = []
+    for _ in range(2):
+        task.restore(kept)
+        for _ in range(40):
+            task.step(np.repeat(HOLD, 3, axis=0))
+        ends.append((task.observations.tobytes(), task.world.state.tobytes()))
+    assert ends[0] == ends[1]
+    fresh = begun(3, difficulty=3)
+    lay(fresh, **AIM)
+    fire_and_wait(fresh, 80)
+    assert fresh.observations.tobytes() == ends[0][0]
+
+
+@pytest.mark.parametrize(
+    ("kwargs", "words"),
+    [
+        ({"shot": "arrow"}, "'arrow'; it must be one of pistol, artillery"),
+        ({"damping": 0.0}, r"damping is 0.0; it must be in \(0, 1\]"),
+        ({"damping": 1.5}, r"damping is 1.5; it must be in \(0, 1\]"),
+        ({"damping": math.nan}, r"damping is nan; it must be in \(0, 1\]"),
+    ],
+)
+def test_bad_arguments(kwargs, words):
+    with pytest.raises(ValueError, match=words):
+        gym.make(ID, **kwargs)
+
+
+# The controller
+
+
+def succeeded(policy, *, episodes=100, **kwargs):
+    envs = gym.make_vec(ID, episodes, **kwargs)
+    observation, _ = envs.reset(seed=1_000_000)
+    policy.reset(episodes)
+    running, won = np.ones(episodes, bool), np.zeros(episodes, bool)
+    while running.any():
+        observation, _, terminated, truncated, info = envs.step(policy(observation))
+        won |= running & info["is_success"]
+        running &= ~(terminated | truncated)
+    return won.sum()
+
+
+class Spoilt(BallisticController):
+    """The controller, blind to one thing."""
+
+    def __init__(self, *blind):
+        super().__init__()
+        self.blind = list(blind)
+
+    def __call__(self, obs):
+        obs = obs.copy()
+        obs[:, self.blind] = 0.0
+        return super().__call__(obs)
+
+    def wind(self, obs):
+        return np.zeros((len(obs), 2)) if 9 in self.blind else super().wind(obs)
+
+
+@pytest.mark.parametrize("shot", list(sy.scenes.SHOTS))
+def test_every_kind_of_shot_can_be_aimed(shot):
+    assert succeeded(BallisticController(shot), shot=shot, difficulty=2) >= 95
+
+
+def test_the_hidden_wind_shows_in_the_flight():
+    seen = succeeded(BallisticController(), difficulty=3)
+    assert seen > succeeded(Spoilt(9, 10), difficulty=3)
+
+
+# Pictures
+
+
+def red_place(pixels):
+    """Middle of the red pixels, (column, row)."""
+    red, green, blue = np.moveaxis(pixels.astype(int), 2, 0)
+    rows, columns = np.nonzero((red > green + 70) & (red > blue + 70) & (green < 110))
+    return np.array([columns.mean(), rows.mean()])
+
+
+@pytest.mark.parametrize("place", [(0.0, 6.0, 45.0), (20.0, 4.0, 40.0), (-25.0, 9.0, 60.0)])
+def test_the_target_is_drawn_where_it_is(place):
+    pytest.importorskip("pygame")
+    task = begun()
+    put_target(task, place)
+    camera = Camera(**task.camera)
+    pixels = picture(task.drawing(0), camera=camera)
+    np.testing.assert_allclose(red_place(pixels), pixel_of(place, camera), atol=2.0)
+
+
+def test_shot_trail_and_mark_are_drawn_while_there_are_any():
+    task = begun()
+    lay(task, **AIM)
+    put_target(task, (0.0, 6.0, 60.0))
+    before = task.drawing(0)
+    fire_and_wait(task, 60)
+    during = task.drawing(0)
+    trail = [line for line in during.lines if line.color[:3] == sy.draw.palette.LOAD]
+    assert len(during.lines) - len(before.lines) == len(trail)
+    np.testing.assert_allclose(trail[0].start, (0.0, 1.5, 0.0), atol=1e-9)
+    np.testing.assert_allclose(trail[-1].end, task.world.particles.position[0, 0])
+    np.testing.assert_allclose(trail[20].start, flown(0.6, **AIM, damping=0.9), atol=1e-9)
+    fire_and_wait(task, 200)
+    after = task.drawing(0)
+    stake = {line.start for line in after.lines} - {line.start for line in before.lines}
+    np.testing.assert_allclose(list(stake), [task.flight[flight.MARK : flight.MARK + 3, 0]])
