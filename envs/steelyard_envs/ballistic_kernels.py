@@ -32,7 +32,9 @@ SECTOR = 0.6  # target and barrel start within this azimuth to either side [rad]
 CROSSING = 12.0  # time in which a moving target runs from one random place to another [s]
 
 # Rows of ``values``; those of the flight follow from FLIGHT on.
-AZIMUTH, ELEVATION, LEFT, FIRED_AT, FIRED, ELAPSED, WIND_X, WIND_Z, FLIGHT = range(9)
+(
+    AZIMUTH, ELEVATION, LEFT, FIRED_AT, FIRED, ELAPSED, WIND_X, WIND_Z, CLOSENESS, FLIGHT,
+) = range(10)  # fmt: skip
 # Entries of ``settings`` and ``layout``.
 (
     DT, LIMIT, RADIUS, WEAVE_MOST, WEAVE_RATE, WIND_MOST, WIND_SEEN, MOVES, NEAR, FAR,
@@ -188,10 +190,15 @@ def _judge(values, flight, settings, layout, state, rewards, flags):
     for w in range(flags.shape[1]):
         broken = state[layout[NONFINITE], w] > 0.0
         hit = flight[EVENT, w] == HIT and not broken
-        missed = flight[EVENT, w] == MISSED and not broken
-        miss = math.sqrt(flight[CLOSEST, w]) / (settings[FAR] / 16.0)
+        closeness = values[CLOSENESS, w]
+        if hit:
+            closeness = 1.0
+        elif flight[EVENT, w] == MISSED and not broken:
+            closeness = 1.0 / (1.0 + math.sqrt(flight[CLOSEST, w]) / (settings[FAR] / 12.0))
         rewards[1, w] = 10.0 if hit else 0.0
-        rewards[2, w] = 1.0 / (1.0 + miss) if missed else 0.0
+        # A difference of potentials, so that a near miss before the hit pays nothing in the end.
+        rewards[2, w] = closeness - values[CLOSENESS, w]
+        values[CLOSENESS, w] = closeness
         rewards[3, w] = -0.1 if values[FIRED, w] > 0.0 else 0.0
         rewards[4, w] = -0.25 * settings[DT]
         rewards[0, w] = rewards[1, w] + rewards[2, w] + rewards[3, w] + rewards[4, w]

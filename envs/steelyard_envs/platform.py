@@ -298,16 +298,86 @@ class PlatformTask(Task):
             drawing.circle(foot, 0.12)
         drawing.line(feet[0], feet[1], width=0.06)
         drawing.face(corners[[0, 1, 3, 2]], thickness=0.12)
-        drawing.circle(load + (0.0, 0.35, 0.0), 0.3, color=(214, 92, 58))
+        drawing.circle((load[0], load[1] + 0.35, load[2]), 0.3, color=(214, 92, 58))
         observation = self.observations[index]
-        drawing.text("pitch", f"{math.degrees(math.asin(observation[4])):+.1f} deg")
-        drawing.text("roll", f"{math.degrees(math.asin(observation[5])):+.1f} deg")
-        drawing.text("time", f"{self.values[_ELAPSED, index] / self.control_rate:.2f} s")
+        drawing.text("pitch", value=f"{math.degrees(math.asin(observation[4])):+.1f} deg")
+        drawing.text("roll", value=f"{math.degrees(math.asin(observation[5])):+.1f} deg")
+        drawing.text("time", value=f"{self.values[_ELAPSED, index] / self.control_rate:.2f} s")
         return drawing
 
 
 class PlatformEnv(TaskEnv):
-    """Platform."""
+    """Keep a deck on two feet level by moving a load over it.
+
+    ## Description
+    A T-shaped platform of six particles of 1 kg, all joined by rods, stands on two feet on ground with
+    friction (coefficient 0.8). A load of 10 kg rides on the deck, which spans 7 m by 2 m at a height of 2 m.
+    With the load near 0.4 of the deck's length the platform balances, and is unstable there. The agent
+    moves the load; random pushes disturb the deck.
+
+    ## Action Space
+    `Box(-1.0, 1.0, (2,), float32)`. Commanded speeds of the load; it accelerates towards them at no more
+    than 8 m/s^2 along and 3 m/s^2 across the deck. Values out of range are clipped.
+
+    | Num | Action | Min | Max | Unit |
+    |---|---|---|---|---|
+    | 0 | speed of the load along | -1 (-3 m/s) | 1 (3 m/s) | - |
+    | 1 | speed of the load across | -1 (-1.5 m/s) | 1 (1.5 m/s) | - |
+
+    ## Observation Space
+    `Box` of shape `(13,)`, float32, clipped to these bounds:
+
+    | Num | Observation | Min | Max | Unit |
+    |---|---|---|---|---|
+    | 0 | place of the load along the deck | -3 | 4 | m |
+    | 1 | place of the load across the deck | -1 | 1 | m |
+    | 2 | speed of the load along the deck | -3 | 3 | m/s |
+    | 3 | speed of the load across the deck | -1.5 | 1.5 | m/s |
+    | 4 | pitch: sine of the deck's slope along | -1 | 1 | - |
+    | 5 | roll: sine of the deck's slope across | -1 | 1 | - |
+    | 6 | rate of the pitch | -10 | 10 | 1/s |
+    | 7 | rate of the roll | -10 | 10 | 1/s |
+    | 8 | yaw: sine of the deck's turn | -1 | 1 | - |
+    | 9 | height of the foot at z = 1 | -1 | 5 | m |
+    | 10 | height of the foot at z = -1 | -1 | 5 | m |
+    | 11 | place of the feet along x | -5 | 5 | m |
+    | 12 | place of the feet along z | -5 | 5 | m |
+
+    ## Rewards
+    The sum of three terms, each in the info:
+    - `reward_level`: 1 / (1 + (pitch^2 + roll^2) / 0.1^2), 1 on a level deck;
+    - `reward_effort`: -0.1 (speed of the load / 3 m/s)^2;
+    - `reward_fall`: -10 in the step in which it falls.
+
+    ## Starting State
+    The platform stands on both feet, tilted about them by up to 0.03, 0.05 or 0.08 rad at difficulty 1, 2
+    or 3, the load at rest within 2 % of the deck's length of the balance and 10 % of its width of the middle.
+
+    ## Episode End
+    Terminated when the deck's slope along or across passes 25 degrees, or when the physics of this world
+    is no longer finite (`physics_error` in the info). Truncated after 500 steps (10 s). `is_success` is True
+    once the platform has stood for 500 steps.
+
+    ## Arguments
+    - `difficulty`: 1, 2 (default) or 3: start tilt as above; pushes of up to 0, 6 or 10 N s in a random
+      direction, about every 1.5 s.
+    - `method`: `"rattle"` (default), `"symplectic_euler"` or `"gauss_seidel"`.
+    - `physics_rate`: physics steps per second, a multiple of the control rate; 50 by default.
+    - `control_rate`: control steps per second; 50 by default.
+    - `render_mode`: `"human"`, `"rgb_array"` or None.
+
+    ## Physics
+    One step of dt = 0.02 s per control step by default. The load is a particle held at its place on the
+    deck with its full inertia, not a mass spread over the corners. Measured errors stand in
+    `docs/environments.md` with the command that measured them.
+
+    ## Baselines
+    `steelyard_agents.controllers` holds a linear-quadratic regulator for this environment, and
+    `agents/results` the scores of random actions, of that controller and of PPO.
+
+    ## Version History
+    - v0: first version.
+    """
 
     task_class = PlatformTask
 

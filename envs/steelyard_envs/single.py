@@ -13,7 +13,7 @@ from steelyard_envs.task import PHYSICS_ERROR, SUCCESS, TERMINATED, Task
 Observation = NDArray[np.float32]
 
 
-class TaskEnv(gym.Env[Observation, NDArray[np.float32]]):
+class TaskEnv(gym.Env[Any, Any]):
     """One world of a task. Subclasses name the task; ``gymnasium.make`` adds the time limit.
 
     Args:
@@ -93,7 +93,7 @@ class TaskEnv(gym.Env[Observation, NDArray[np.float32]]):
         """Continue from a snapshot of this environment."""
         self.task.restore(snapshot)
 
-    def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
+    def render(self) -> NDArray[np.uint8] | None:
         """A frame (height, width, 3) in mode "rgb_array"; a window in mode "human"."""
         if self.render_mode is None:
             warn_of_no_mode(self)

@@ -35,8 +35,9 @@ def source_stamp(function: Callable[..., Any]) -> tuple[str, str]:
 
 
 def _compile(function: Callable[..., Any], **options: bool) -> Any:
-    dispatcher = numba.njit(cache=True, nogil=True, error_model="numpy", **options)(function)
-    store = getattr(dispatcher, "_cache", None)  # absent when NUMBA_DISABLE_JIT is set
+    settings: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy", **options}
+    dispatcher: Any = numba.njit(**settings)(function)
+    store: Any = getattr(dispatcher, "_cache", None)  # absent when NUMBA_DISABLE_JIT is set
     implementation = getattr(store, "_impl", None)
     if implementation is not None:
         store._cache_file = IndexDataCacheFile(

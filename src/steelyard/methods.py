@@ -11,9 +11,10 @@ from .integrators.rattle import Rattle
 from .integrators.symplectic_euler import SymplecticEuler
 from .scene import checks
 from .scene.contacts import Ground, LinePlatform
+from .scene.forces import StiffSpring
 from .scene.links import Cable, CableConstraint
 from .scene.rider import Rider
-from .scene.scene import CONTACTS, FORCES, LINKS, Scene, StiffSpring, members
+from .scene.scene import CONTACTS, FORCES, LINKS, Scene, members
 from .solvers.base import Solver
 from .solvers.direct import Direct
 from .solvers.gauss_seidel import GaussSeidel

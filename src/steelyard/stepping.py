@@ -80,8 +80,12 @@ def _advance_controls(tape, s, dt):
     """Winches and riders move to where they are at the step's end."""
     at = tape[H_WINCHES]
     for index in range(tape[at]):
-        length = tape[at + 1 + 2 * index]
-        store(s, length, fma(dt, load(s, tape[at + 2 + 2 * index]), load(s, length)))
+        winch = at + 1 + 3 * index
+        length, speed = tape[winch], tape[winch + 1]
+        rate = load(s, speed)
+        end_rate = fma(dt, load(s, tape[winch + 2]), rate)
+        store(s, length, fma(splat(0.5) * dt, rate + end_rate, load(s, length)))
+        store(s, speed, end_rate)
     if tape[tape[H_RIDERS]] > 0:
         rider_advance(tape, s, dt)
 

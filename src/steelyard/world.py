@@ -219,8 +219,8 @@ class World:
 
         Args:
             thing: "particles", or a link, rider or generator of the scene.
-            name: "position" (3 rows per particle), "velocity", "time", "nonfinite"; "length" or "rate" of a
-                winch; "weights" or "rates" of a rider.
+            name: "position" (3 rows per particle), "velocity", "time", "nonfinite"; "length", "rate" or
+                "acceleration" of a winch; "weights", "rates" or "accelerations" of a rider.
         """
         return self.model.places[thing, name][0]
 

@@ -45,9 +45,7 @@ def from_particle_scene(source: ParticleScene, *, cable_restitution: float = 0.0
     for a, b, length in source.cables:
         scene.add(sy.Cable(particles[a], particles[b], length, restitution=cable_restitution))
     for p, anchor, length in source.supports:
-        scene.add(
-            sy.CableConstraint(particles[p], anchor, length, restitution=cable_restitution)
-        )
+        scene.add(sy.CableConstraint(particles[p], anchor, length, restitution=cable_restitution))
     return scene
 
 

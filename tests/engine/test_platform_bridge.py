@@ -11,7 +11,14 @@ from benchmarks.scenes import bridge, bridge_mass, tumbling_platform
 from tests.engine.builders import Array, from_particle_scene
 
 REST_HEIGHTS = np.repeat(
-    [3.154078348949, 2.545803446869, 2.007820144332, 2.007820144332, 2.545803446869, 3.154078348949],
+    [
+        3.154078348949,
+        2.545803446869,
+        2.007820144332,
+        2.007820144332,
+        2.545803446869,
+        3.154078348949,
+    ],
     2,
 )
 LOADED_HEIGHTS = np.array(

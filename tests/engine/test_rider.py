@@ -32,9 +32,7 @@ def ridden_platform(weights: Array) -> tuple[sy.Scene, sy.Rider, ParticleScene]:
         mass=np.append(source.mass, LOAD),
     )
     scene = from_particle_scene(source)
-    load = scene.add(
-        sy.Particle(position=whole.position[6], velocity=whole.velocity[6], mass=LOAD)
-    )
+    load = scene.add(sy.Particle(position=whole.position[6], velocity=whole.velocity[6], mass=LOAD))
     rider = scene.add(sy.Rider(load, scene.particles[2:6], weights))
     return scene, rider, whole
 

@@ -326,7 +326,10 @@ def platform_scene() -> sy.Scene:
     return scene
 
 
-CARRIERS = {"bridge": (bridge_scene, bridge_weights), "platform": (platform_scene, platform_weights)}
+CARRIERS = {
+    "bridge": (bridge_scene, bridge_weights),
+    "platform": (platform_scene, platform_weights),
+}
 
 
 @pytest.mark.parametrize("carrier", CARRIERS)

@@ -36,9 +36,7 @@ def recorded(name: str) -> tuple[sy.Scene, Array, Array]:
         data = dict(file)
     scene = sy.Scene()
     particles = [
-        scene.add(
-            sy.Particle(position=x, velocity=v, inverse_mass=w, acceleration=a, damping=d)
-        )
+        scene.add(sy.Particle(position=x, velocity=v, inverse_mass=w, acceleration=a, damping=d))
         for x, v, w, a, d in zip(
             data["position"][0],
             data["velocity"][0],

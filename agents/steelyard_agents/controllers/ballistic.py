@@ -11,7 +11,7 @@ from steelyard_envs.ballistic_flight import LIFE, MUZZLE
 from steelyard_envs.ballistic_kernels import AZIMUTH_RATE, ELEVATION_RATE
 
 # Angle off the solution at which it fires [rad]: .8 m at 80 m, where targets have 1.6 m and more.
-TOLERANCE = 0.01
+TOLERANCE = 0.006
 
 
 class BallisticController:

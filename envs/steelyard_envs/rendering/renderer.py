@@ -92,7 +92,8 @@ class Renderer:
 
     def _show(self) -> None:
         pygame = self._pygame
-        if self._window is None:
+        # pygame has one display: another renderer may have closed it.
+        if self._window is None or pygame.display.get_surface() is not self._window:
             pygame.display.init()
             pygame.display.set_caption("Steelyard")
             self._window = pygame.display.set_mode((self.width, self.height))

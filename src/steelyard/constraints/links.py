@@ -49,23 +49,25 @@ def link_gradients(tape, s):
 
 
 @inner
-def link_targets(tape, s):
+def link_targets(tape, s, dt):
     """Rate of g each link must have after the step, decided at its start.
 
-    A rod or taut cable follows its winch: L dL/dt. A cable that is closing on its end rebounds: minus
-    restitution times the closing rate beyond the winch's. A cable overstretched at the start is held
-    like a rod, so that pulling it back leaves no velocity.
+    A rod or taut cable follows its winch: L dL/dt at the step's end. A cable that is closing on its end
+    rebounds: minus restitution times the closing rate beyond the winch's. A cable overstretched at the
+    start is held like a rod, so that pulling it back leaves no velocity.
     """
     at = tape[H_LINKS]
     zero = splat(0.0)
     for index in range(tape[at]):
         link = at + 1 + LINK * index
         length = load(s, tape[link + 8])
-        follow = length * load(s, tape[link + 9])
+        rate = load(s, tape[link + 9])
+        end_rate = fma(dt, load(s, tape[link + 16]), rate)
+        follow = fma(splat(0.5) * dt, rate + end_rate, length) * end_rate
         if tape[link + 10] == 0:
             store(s, tape[link + 14], follow)
         else:
-            closing = link_rate(s, link, tape) - follow
+            closing = link_rate(s, link, tape) - length * rate
             rebound = select(closing > zero, closing * load(s, tape[link + 11]), zero)
             store(s, tape[link + 14], follow - rebound)
             over = link_half_square(s, link, tape, length) > splat(1e-9) * length * length

@@ -4,11 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from typing import Any
+
+from numpy.typing import NDArray
 
 from . import palette
 
 Point = tuple[float, float, float]
 Color = tuple[int, ...]
+
+#: What callers may pass for a point: three numbers [m], y up.
+Coordinates = Sequence[float] | NDArray[Any]
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,8 +115,8 @@ class Drawing:
 
     def line(
         self,
-        start: Sequence[float],
-        end: Sequence[float],
+        start: Coordinates,
+        end: Coordinates,
         *,
         color: Sequence[int] = palette.INK,
         width: float = 0.0,
@@ -127,12 +133,12 @@ class Drawing:
 
     def circle(
         self,
-        centre: Sequence[float],
+        centre: Coordinates,
         radius: float,
         *,
         color: Sequence[int] = palette.INK,
         fill: bool = True,
-        normal: Sequence[float] | None = None,
+        normal: Coordinates | None = None,
         width: float = 0.0,
         pixels: float = 1.5,
         layer: int = 0,
@@ -163,7 +169,7 @@ class Drawing:
 
     def face(
         self,
-        points: Iterable[Sequence[float]],
+        points: Iterable[Coordinates],
         *,
         color: Sequence[int] = palette.DECK,
         thickness: float = 0.0,
@@ -187,7 +193,7 @@ class Drawing:
         label: str,
         *,
         value: str = "",
-        position: Sequence[float] | None = None,
+        position: Coordinates | None = None,
         color: Sequence[int] = palette.INK,
     ) -> None:
         """Add a `Text`: a row of the panel, or a label at a `position` [m].
@@ -206,7 +212,7 @@ class Drawing:
         self.texts.extend(other.texts)
 
 
-def _point(value: Sequence[float]) -> Point:
+def _point(value: Coordinates) -> Point:
     # Not-a-number is let through: a world that has blown up must still make a picture.
     if len(value) != 3:
         raise ValueError(f"a point needs three coordinates (x, y, z) in metres, got {value!r}")

@@ -109,9 +109,9 @@ def flight_fall_time(height, velocity, acceleration, rate):
             else -velocity / acceleration
         )
     extreme = flight(height, velocity, acceleration, rate, turn)[0] if turn < math.inf else 0.0
-    if height < 0.0 or (height == 0.0 and not rises):
-        if not (rises and acceleration < 0.0 and extreme > 0.0):
-            return 0.0
+    below = height < 0.0 or (height == 0.0 and not rises)
+    if below and not (rises and acceleration < 0.0 and extreme > 0.0):
+        return 0.0
     if acceleration < 0.0:
         if rate * velocity < acceleration:
             # Faster than its terminal speed: the height is convex, and Newton's method safe from the start.

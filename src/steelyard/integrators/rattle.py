@@ -4,8 +4,8 @@
     kick h/2, damp h/2, velocity stage (gradients of the step's end).
 
 Order 2, symplectic and time-reversible without damping and contacts; a spring is stable while h w < 2, with
-phase error (h w)^2/24 per radian. Damping and drag are exact flows of half a step on either side. Impacts are resolved to
-the step (order 1 in their time), after Capobianco, Harsch, Eugster & Leine (2021).
+phase error (h w)^2/24 per radian. Damping and drag are exact flows of half a step on either side. Impacts
+are resolved to the step (order 1 in their time), after Capobianco, Harsch, Eugster & Leine (2021).
 """
 
 from __future__ import annotations

@@ -21,6 +21,12 @@ from numba.core.typing.templates import AbstractTemplate, infer_global, signatur
 
 LANES = 8
 
+
+def _operation(function: Any) -> Any:
+    """numba's intrinsic, whose first parameter callers do not pass."""
+    return intrinsic(function)
+
+
 _DOUBLES = ir.VectorType(ir.DoubleType(), LANES)
 _BITS = ir.VectorType(ir.IntType(1), LANES)
 _BYTE = ir.IntType(LANES)
@@ -62,7 +68,7 @@ def _pointer(context: Any, builder: Any, array_type: Any, array: Any, row: Any) 
     return builder.bitcast(start, _DOUBLES.as_pointer())
 
 
-@intrinsic
+@_operation
 def load(typing_context: Any, rows: Any, row: Any) -> Any:
     """Lane vector in row ``row`` of a C-contiguous scratch of shape (rows, LANES)."""
 
@@ -72,7 +78,7 @@ def load(typing_context: Any, rows: Any, row: Any) -> Any:
     return lane(rows, types.int64), codegen
 
 
-@intrinsic
+@_operation
 def store(typing_context: Any, rows: Any, row: Any, value: Any) -> Any:
     """Write a lane vector to row ``row`` of a scratch of shape (rows, LANES)."""
 
@@ -83,7 +89,7 @@ def store(typing_context: Any, rows: Any, row: Any, value: Any) -> Any:
     return types.void(rows, types.int64, lane), codegen
 
 
-@intrinsic
+@_operation
 def splat(typing_context: Any, value: Any) -> Any:
     """The same scalar in every lane."""
 
@@ -107,25 +113,25 @@ def _llvm(name: str, count: int) -> Any:
     return codegen
 
 
-@intrinsic
+@_operation
 def fma(typing_context: Any, a: Any, b: Any, c: Any) -> Any:
     """a * b + c, rounded once."""
     return lane(lane, lane, lane), _llvm("fma", 3)
 
 
-@intrinsic
+@_operation
 def sqrt(typing_context: Any, a: Any) -> Any:
     """Square root, correctly rounded."""
     return lane(lane), _llvm("sqrt", 1)
 
 
-@intrinsic
+@_operation
 def absolute(typing_context: Any, a: Any) -> Any:
     """Absolute value."""
     return lane(lane), _llvm("fabs", 1)
 
 
-@intrinsic
+@_operation
 def select(typing_context: Any, condition: Any, yes: Any, no: Any) -> Any:
     """``yes`` in the lanes where the condition holds, ``no`` in the others."""
 
@@ -135,7 +141,7 @@ def select(typing_context: Any, condition: Any, yes: Any, no: Any) -> Any:
     return lane(mask, lane, lane), codegen
 
 
-@intrinsic
+@_operation
 def any_lane(typing_context: Any, condition: Any) -> Any:
     """True when the condition holds in at least one lane."""
 

@@ -1,7 +1,7 @@
 """Counter-based random numbers: no state but a key and a counter, so every world has a stream of its own.
 
-Number ``counter`` of the stream ``key`` is SplitMix64's output function applied twice (Steele, Lea & Flood 2014); keys are
-mixed first, so that neighbouring seeds give unrelated streams.
+Number ``counter`` of the stream ``key`` is SplitMix64's output function (Steele, Lea & Flood 2014) of their sum;
+keys are mixed first, so that neighbouring seeds give unrelated streams.
 """
 
 from __future__ import annotations

@@ -85,7 +85,7 @@ class Compiler:
         self.counts: dict[str, int] = {}
         self.widths = {
             "springs": 7, "gravities": 3, "buoyancies": 5, "drags": 7, "stiff_springs": 8, "drift": 1,
-            "winches": 2, "links": LINK, "contacts": CONTACT, "generators": 2,
+            "winches": 3, "links": LINK, "contacts": CONTACT, "generators": 2,
         }  # fmt: skip
         self.next_row = 0
         self.start: list[float] = []
@@ -187,6 +187,7 @@ class Compiler:
             if getattr(link, "winch", False):
                 self.state((link, "length"), [link.max_length])
                 self.state((link, "rate"), [0.0])
+                self.state((link, "acceleration"), [0.0])
         for rider in self.riders:
             self.state((rider, "weights"), rider.weights)
             self.state((rider, "rates"), np.zeros(len(rider.deck)))
@@ -329,12 +330,13 @@ class Compiler:
             wind = self.parameter(drag, "wind", drag.wind)
             for p in self.some(drag.particles):
                 if p.movable:
+                    index = self.of(p)
                     flow = self.slot(
                         2,
                         ((drag, "linear"), (PARTICLES, "inverse_mass")),
-                        lambda k1, inverse, i=self.of(p): derived.drag(
-                            k1, inverse[i : i + 1], share
-                        )[:, 0],
+                        lambda k1, inverse, i=index: derived.drag(k1, inverse[i : i + 1], share)[
+                            :, 0
+                        ],
                     )
                     f = self.at("force", p) if force >= 0 else -1
                     self.sections["drags"] += [
@@ -398,9 +400,11 @@ class Compiler:
             if winch:
                 length_row = self.place(link, "length")
                 rate_row = self.place(link, "rate")
-                winches += [length_row, rate_row]
+                gain_row = self.place(link, "acceleration")
+                winches += [length_row, rate_row, gain_row]
             else:
-                length_row, rate_row = self.parameter(link, "length", length), self.zero
+                length_row = self.parameter(link, "length", length)
+                rate_row = gain_row = self.zero
             restitution = (
                 self.parameter(link, "restitution", link.restitution) if cable else self.zero
             )
@@ -421,7 +425,7 @@ class Compiler:
             records += [
                 self.at("position", a), b[0], self.at("velocity", a), b[1], self.at("impulse", a), b[2],
                 self.header["inverse_mass"] + self.of(a), b[3], length_row, rate_row, int(cable), restitution,
-                self.place(link, "multiplier") if staged else -1, work, work + 3, -1,
+                self.place(link, "multiplier") if staged else -1, work, work + 3, -1, gain_row,
             ]  # fmt: skip
         self.sections["links"] = records
         self.sections["winches"] = winches
@@ -465,8 +469,9 @@ class Compiler:
             if isinstance(generator, ContactGenerator):
                 kind, place = USER, self.place(generator, f"pair {k}")
             if id(a) not in radii:
+                index = self.of(a)
                 radii[id(a)] = self.slot(
-                    1, ((PARTICLES, "radius"),), lambda value, i=self.of(a): value[i : i + 1]
+                    1, ((PARTICLES, "radius"),), lambda value, i=index: value[i : i + 1]
                 )
             spare = self.header["impulse"] + 3 * len(self.particles)
             z = self.zero

@@ -362,8 +362,8 @@ class Network:
                 (self.a[k, i], k, 1) for k in range(i + 1, self.count) if i in self.pattern[k]
             ]
             products += [3 * block, self.diagonal[i], block, self.reference[i], len(others)]
-            for rows, k, transposed in others:
-                products += [rows, 3 * self.order[k], transposed, self.order[k]]
+            for entry, k, transposed in others:
+                products += [entry, 3 * self.order[k], transposed, self.order[k]]
         size = self.count - first
         c.header["dense"] = c.take(3 * size * (3 * size + 1)) if size <= DENSE_CONTACTS else -1
         c.sections |= {

@@ -73,7 +73,7 @@ from __future__ import annotations
 HEADER = 60
 
 # Width of the records of links and contacts; ``model.compile`` writes them field by field.
-LINK = 16
+LINK = 17
 CONTACT = 24
 
 # Codes of integrators, solvers and contact geometries.

@@ -85,7 +85,8 @@ class Cable:
         b: the other particle.
         max_length: greatest distance [m], above 0.
         restitution: speed of parting over speed of approach when the cable snaps taut, in [0, 1].
-        winch: whether ``world[cable].rate`` [m/s] lengthens it as the world steps.
+        winch: whether ``world[cable].rate`` [m/s] and ``world[cable].acceleration`` [m/s^2] lengthen it as the
+            world steps; a rate that jumps is a blow.
     """
 
     a: Particle
@@ -109,7 +110,8 @@ class CableConstraint:
         anchor: the point [m]; may be assigned between steps.
         max_length: greatest distance [m], above 0.
         restitution: speed of parting over speed of approach when the cable snaps taut, in [0, 1].
-        winch: whether ``world[cable].rate`` [m/s] lengthens it as the world steps.
+        winch: whether ``world[cable].rate`` [m/s] and ``world[cable].acceleration`` [m/s^2] lengthen it as the
+            world steps; a rate that jumps is a blow.
     """
 
     particle: Particle

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from . import checks
 from .particle import Particle
 
 
@@ -31,7 +32,7 @@ class Rider:
 
     particle: Particle
     deck: Sequence[Particle]
-    weights: Sequence[float] | None = None
+    weights: checks.Vector | None = None
 
     def __post_init__(self) -> None:
         self.deck = tuple(self.deck)

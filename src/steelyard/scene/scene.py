@@ -109,7 +109,7 @@ class Scene:
                 )
         self.things = [other for other in self.things if other is not thing]
 
-    def of(self, *kinds: type[Thing]) -> list[Thing]:
+    def of(self, *kinds: type) -> list[Any]:
         """The things of exactly these kinds, in the order they were added."""
         return [thing for thing in self.things if type(thing) in kinds]
 

@@ -37,8 +37,8 @@ _ANCHORS = 2
 def factorise_contacts(tape, s, skip):
     """Factor of W over the masked rows, a little softened.
 
-    Contacts joined by links share their load in more ways than one. A little softness on the diagonal makes the solution the one of
-    least norm, which spreads friction and so stays inside the cones where it can.
+    Contacts joined by links share their load in more ways than one. A little softness on the diagonal makes
+    the solution the one of least norm, which spreads friction and so stays inside the cones where it can.
     """
     at = tape[H_CONTACT_COPIES]
     for index in range(tape[at]):

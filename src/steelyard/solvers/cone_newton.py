@@ -6,8 +6,9 @@ Alart & Curnier (1991): with u = W l - b and per-contact scales r_n, r_t, the la
 
 a piecewise smooth equation. Each contact is open, sticks or slides at the present guess; that choice gives
 three rows of a dense system, solved by elimination. Contacts joined by links share their load in more ways
-than one: a little softness, u + e (l - l0) for u makes the answer unique, and solving again from l0 = l takes it
-out (the proximal point method). Converges in a few iterations from the last step's impulses; where it does not, sweeps follow.
+than one: a little softness, u + e (l - l0) for u, makes the answer unique, and solving again from l0 = l takes
+it out (the proximal point method). Converges in a few iterations from the last step's impulses; where it
+does not, sweeps follow.
 """
 
 from __future__ import annotations

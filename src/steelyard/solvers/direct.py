@@ -373,10 +373,7 @@ def _right_rows(tape, s, velocity, dt):
         if velocity:
             allowed = allowed / dt
         for axis in range(3):
-            if velocity:
-                error = rider_slip(s, tape, at, axis)
-            else:
-                error = rider_offset(s, tape, at, axis)
+            error = rider_slip(s, tape, at, axis) if velocity else rider_offset(s, tape, at, axis)
             store(s, tape[H_RIGHT] + tape[at + 4] + axis, zero - error)
             bad = bad | (absolute(error) > allowed)
         at += HEAD + DECK * tape[at + 6]

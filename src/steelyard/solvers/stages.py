@@ -20,7 +20,7 @@ def begin_step(tape, s, skip, dt):
     Returns whether the last velocity stage's factor no longer fits.
     """
     link_gradients(tape, s)
-    link_targets(tape, s)
+    link_targets(tape, s, dt)
     rider_coefficients(tape, s)
     contact_geometry(tape, s)
     return contact_targets(tape, s, dt, skip)
