@@ -195,9 +195,9 @@ def _judge(values, flight, settings, layout, state, rewards, flags):
             closeness = 1.0
         elif flight[EVENT, w] == MISSED and not broken:
             closeness = 1.0 / (1.0 + math.sqrt(flight[CLOSEST, w]) / (settings[FAR] / 12.0))
-        rewards[1, w] = 10.0 if hit else 0.0
+        rewards[1, w] = 5.0 if hit else 0.0
         # A difference of potentials, so that a near miss before the hit pays nothing in the end.
-        rewards[2, w] = closeness - values[CLOSENESS, w]
+        rewards[2, w] = 5.0 * (closeness - values[CLOSENESS, w])
         values[CLOSENESS, w] = closeness
         rewards[3, w] = -0.1 if values[FIRED, w] > 0.0 else 0.0
         rewards[4, w] = -0.25 * settings[DT]

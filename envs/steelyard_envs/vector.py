@@ -161,8 +161,6 @@ class TaskVectorEnv(gym.vector.VectorEnv[Array, Array, Array]):
                 task.rewards[:, done] = 0.0
                 task.flags[:, done] = False
                 task.start(done)
-        else:
-            self._done[:] = False
         if self.render_mode == "human":
             self.render()
         info = self._info(self._all) | info

@@ -10,15 +10,17 @@ from .integrators.explicit_euler import ExplicitEuler
 from .integrators.rattle import Rattle
 from .integrators.symplectic_euler import SymplecticEuler
 from .scene import checks
-from .scene.contacts import Ground, LinePlatform
 from .scene.forces import StiffSpring
 from .scene.links import Cable, CableConstraint
 from .scene.rider import Rider
-from .scene.scene import CONTACTS, FORCES, LINKS, Scene, members
+from .scene.scene import CONTACTS, FORCES, LINKS, Scene
 from .solvers.base import Solver
 from .solvers.direct import Direct
 from .solvers.gauss_seidel import GaussSeidel
 from .solvers.worst_first import WorstFirst
+
+_STEP = checks.Limit(above=0.0, remedy="Use 1/60 for sixty steps a second.")
+_TOLERANCE = checks.Limit(above=0.0, remedy="Use 1e-12 for what rounding allows.")
 
 
 @dataclass(frozen=True)
@@ -27,8 +29,13 @@ class Method:
 
     Args:
         integrator: one of the classes of ``steelyard.integrators``.
-        solver: one of the classes of ``steelyard.solvers``; not needed without links, riders and contacts.
+        solver: one of the classes of ``steelyard.solvers``; not needed without links, riders and
+            contacts.
         dt: step [s], above 0.
+
+    Raises:
+        TypeError: no integrator or no solver.
+        ValueError: a step or a setting of the solver out of its limits.
     """
 
     integrator: Integrator
@@ -36,25 +43,15 @@ class Method:
     dt: float = 1.0 / 60.0
 
     def __post_init__(self) -> None:
-        checks.number(
-            "Method", "dt", self.dt, above=0.0, remedy="Use 1/60 for sixty steps a second."
-        )
-        if not isinstance(self.integrator, Integrator):
-            raise TypeError(
-                f"Method: integrator is {self.integrator!r}; it must be an integrator object. Use Rattle()."
-            )
-        if self.solver is not None and not isinstance(self.solver, Solver):
-            raise TypeError(
-                f"Method: solver is {self.solver!r}; it must be a solver object. Use Direct()."
-            )
-        for name in ("passes", "iterations"):
-            checks.number(
-                "Method",
-                name,
-                getattr(self.solver, name, 1),
-                least=0 if name == "iterations" else 1,
-                remedy="Give a whole number.",
-            )
+        checks.number("Method", "dt", self.dt, _STEP)
+        checks.instance("Method", "integrator", self.integrator, Integrator, remedy="Use Rattle().")
+        if self.solver is not None:
+            checks.instance("Method", "solver", self.solver, Solver, remedy="Use Direct().")
+        owner = type(self.solver).__name__
+        for name, least in (("passes", 1), ("iterations", 0)):
+            count = getattr(self.solver, name, least)
+            checks.whole(owner, name, count, least=least, remedy="Give a count.")
+        checks.number(owner, "tolerance", getattr(self.solver, "tolerance", 1.0), _TOLERANCE)
 
     def refuse(self, scene: Scene) -> None:
         """Raise if this method cannot do what a scene holds.
@@ -68,8 +65,8 @@ class Method:
             other = held or scene.of(*FORCES)
             if other:
                 raise ValueError(
-                    f"ClosedForm cannot step a {type(other[0]).__name__}; the limit is free flight with "
-                    "constant acceleration and damping. Use Rattle()."
+                    f"ClosedForm cannot step a {type(other[0]).__name__}; the limit is free flight "
+                    "with constant acceleration and damping. Use Rattle()."
                 )
         elif held and self.solver is None:
             raise ValueError(
@@ -87,20 +84,16 @@ class Method:
             )
         if isinstance(self.solver, WorstFirst) and scene.of(Rider):
             raise ValueError(
-                "WorstFirst cannot hold a Rider: it has no impulse for it. Use Direct(), or spread the load's mass "
-                "over the deck (steelyard.scenes.lumped_masses)."
+                "WorstFirst cannot hold a Rider: it has no impulse for it. Use Direct(), or spread "
+                "the load's mass over the deck (steelyard.scenes.lumped_masses)."
             )
         sprung = {id(spring.particle) for spring in scene.of(StiffSpring)}
         for thing in held:
-            if isinstance(thing, Ground | LinePlatform) and thing.particles is None:
-                touched = [p for p in scene.particles if p.movable]
-            else:
-                touched = list(members(thing))
-            if any(id(p) in sprung for p in touched):
+            if any(id(p) in sprung for p in scene.touched(thing)):
                 raise ValueError(
-                    f"{name}: a particle on a StiffSpring also takes part in a {type(thing).__name__}; the "
-                    "spring's solution is exact only alone. Use AnchoredSpring, or name the other "
-                    "particles."
+                    f"{name}: a particle on a StiffSpring also takes part in a "
+                    f"{type(thing).__name__}; the spring's solution is exact only alone. Use "
+                    "AnchoredSpring, or name the other particles."
                 )
         if isinstance(self.integrator, ExplicitEuler) and any(
             isinstance(x, Cable | CableConstraint) and x.winch for x in scene.of(*LINKS)

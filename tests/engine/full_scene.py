@@ -80,6 +80,7 @@ def control(world: sy.World, things: dict[str, Any]) -> None:
     world.particles.velocity[:, :6] += 0.1 * rng.normal(size=(world.worlds, 6, 3))
     if "winch" in things:
         world[things["winch"]].rate = rng.uniform(-0.2, 0.2, world.worlds)
+        world[things["winch"]].acceleration = rng.uniform(-0.1, 0.1, world.worlds)
     if "rider" in things:
         speed = rng.uniform(-0.3, 0.3, world.worlds)
         world[things["rider"]].rates = np.stack([speed, -speed], axis=1)
@@ -97,7 +98,10 @@ def state(world: sy.World, things: dict[str, Any]) -> dict[str, np.ndarray]:
     staged = not isinstance(world.method.solver, sy.WorstFirst)
     for name, thing in things.items():
         if name in ("winch", "rider"):
-            kept = {"winch": ("length", "rate"), "rider": ("weights", "rates", "accelerations")}
+            kept = {
+                "winch": ("length", "rate", "acceleration"),
+                "rider": ("weights", "rates", "accelerations"),
+            }
             found |= {f"{name} {each}": getattr(world[thing], each) for each in kept[name]}
         if staged and name in ("rod", "cable", "rod to a point", "hanger", "winch", "rider"):
             found[f"{name} multiplier"] = world[thing].multiplier

@@ -52,7 +52,7 @@ LINKED: dict[str, tuple[Callable[[sy.Particle, sy.Particle], object], int, int]]
     "RodConstraint": (lambda a, b: sy.RodConstraint(a, (0, 5, 0)), 1, 6),
     "Cable": (lambda a, b: sy.Cable(a, b, 1.0), 1, 6),
     "CableConstraint": (lambda a, b: sy.CableConstraint(a, (0, 5, 0), 3.0), 1, 6),
-    "winch": (lambda a, b: sy.Cable(a, b, 1.0, winch=True), 1 + 2, 6 + 2),
+    "winch": (lambda a, b: sy.Cable(a, b, 1.0, winch=True), 1 + 3, 6 + 3),
     "Ground": (lambda a, b: sy.Ground(), 2 * 3, 2 * 6),
     "Ground for one": (lambda a, b: sy.Ground(particles=[b]), 3, 6),
     "LinePlatform": (

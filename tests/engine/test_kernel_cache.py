@@ -28,6 +28,11 @@ def load(path: Path) -> ModuleType:
     return module
 
 
+def sample(x: float) -> float:
+    """A function outside the engine, so that only the engine's part of its stamp varies here."""
+    return x
+
+
 @pytest.fixture
 def copied(tmp_path: Path) -> Path:
     """The package's sources at another place."""
@@ -37,9 +42,8 @@ def copied(tmp_path: Path) -> Path:
 
 
 def stamp(package: Path) -> object:
-    """The stamp that a package gives to a function of its own."""
-    module = load(package / "kernel.py")
-    return module.source_stamp(module.kernel)
+    """The stamp that a package gives to a function of another folder."""
+    return load(package / "kernel.py").source_stamp(sample)
 
 
 def test_the_same_sources_have_the_same_stamp(copied: Path) -> None:
@@ -81,15 +85,18 @@ def test_a_kernel_outside_the_engine_is_stamped_with_its_own_folder_too(tmp_path
 
 
 PRINT = """
-from small.outer import outer
+from outer import outer
 print(outer(1.0))
 print(f"cache_hits={dict(outer.stats.cache_hits)}, cache_misses={dict(outer.stats.cache_misses)}")
 """
 
 
 def run(folder: Path) -> str:
-    """What a fresh process prints that imports ``outer`` of a package ``small`` in ``folder``."""
-    environment = os.environ | {"PYTHONPATH": str(folder), "NUMBA_CACHE_DIR": str(folder / "cache")}
+    """What a fresh process prints that calls ``outer``, a user's kernel on those of ``small``."""
+    environment = os.environ | {
+        "PYTHONPATH": f"{folder}{os.pathsep}{folder / 'user'}",
+        "NUMBA_CACHE_DIR": str(folder / "cache"),
+    }
     done = subprocess.run(
         [sys.executable, "-c", PRINT],
         env=environment,
@@ -108,7 +115,9 @@ def test_machine_code_of_an_edited_callee_does_not_run(tmp_path: Path) -> None:
     (package / "__init__.py").write_text("")
     inner = "from small.kernel import kernel\n\n@kernel\ndef inner(x):\n    return x + {}\n"
     (package / "inner.py").write_text(inner.format(1.0))
-    (package / "outer.py").write_text(
+    user = tmp_path / "user"
+    user.mkdir()
+    (user / "outer.py").write_text(
         "from small.kernel import kernel\nfrom small.inner import inner\n\n"
         "@kernel\ndef outer(x):\n    return 10.0 * inner(x)\n"
     )

@@ -266,7 +266,7 @@ def test_a_winch_wound_past_its_end_is_flagged() -> None:
     assert world.health[1] != 0
 
 
-@pytest.mark.parametrize("name", ["length", "rate"])
+@pytest.mark.parametrize("name", ["length", "rate", "acceleration"])
 def test_a_winch_that_is_not_finite_is_flagged(name: str) -> None:
     scene = sy.Scene()
     a = scene.add(sy.Particle(position=(0, 2, 0)))

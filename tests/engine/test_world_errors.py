@@ -107,7 +107,7 @@ ASSIGNED: dict[str, tuple[Callable[..., Any], dict[str, list[Any]]]] = {
     ),
     "winch": (
         lambda a, b, c: sy.Cable(a, b, 1.0, winch=True),
-        {"length": [0.0, -1.0], "rate": [], "restitution": [-0.1, 1.1]},
+        {"length": [0.0, -1.0], "rate": [], "acceleration": [], "restitution": [-0.1, 1.1]},
     ),
     "Rider": (
         lambda a, b, c: sy.Rider(c, [a, b]),

@@ -1,8 +1,11 @@
 """Every registered environment, and ways to play it whose outcomes compare bit for bit."""
 
+import sys
+
 import gymnasium as gym
 import numpy as np
 from gymnasium.envs.registration import load_env_creator
+from numba.core.dispatcher import Dispatcher
 
 from steelyard_envs.registration import ENVIRONMENTS
 
@@ -32,6 +35,17 @@ def some_actions(env_id, steps, *, rows=None, seed=0, hold=10):
     shape = row if rows is None else (rows, *row)
     blocks = np.random.default_rng(seed).uniform(-1.0, 1.0, (-(-steps // hold), *shape))
     return np.repeat(blocks, hold, axis=0)[:steps].astype(np.float32)
+
+
+def specialisations():
+    """Argument types for which the environments' kernels are compiled or loaded so far."""
+    return {
+        (module.__name__, name): tuple(kernel.signatures)
+        for module in list(sys.modules.values())
+        if module.__name__.startswith("steelyard_envs.")
+        for name, kernel in vars(module).items()
+        if isinstance(kernel, Dispatcher)
+    }
 
 
 def begin(env, **kwargs):

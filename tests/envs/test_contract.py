@@ -1,5 +1,6 @@
 """What holds for every environment: types, bounds, infos, rewards, actions, and no hidden state."""
 
+import itertools
 import math
 import random
 import warnings
@@ -10,7 +11,16 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 from stable_baselines3.common.env_checker import check_env as sb3_check_env
 
-from tests.envs.environments import IDS, begin, play, some_actions, task_class, variants
+from tests.envs.environments import (
+    IDS,
+    begin,
+    go_on,
+    play,
+    some_actions,
+    specialisations,
+    task_class,
+    variants,
+)
 
 LARGE = float(np.finfo(np.float32).max)
 
@@ -171,17 +181,16 @@ def test_an_environment_leaves_what_it_is_given_alone(env_id):
 
 @pytest.mark.parametrize("env_id", IDS)
 def test_actions_of_any_number_type_and_layout_are_the_same_and_compile_nothing(env_id):
-    event = pytest.importorskip("numba.core.event")
     env = gym.make(env_id, disable_env_checker=True)
     signs = np.sign(some_actions(env_id, 40)).astype(np.float32)
     wanted = play(env, signs, seed=2)
     frozen = signs.copy()
     frozen.flags.writeable = False
     strided = np.repeat(signs, 3, axis=1)[:, ::3]
-    with event.install_recorder("numba:compile") as recorder:
-        for actions in (frozen, strided, signs.astype(float), signs.astype(int), signs.tolist()):
-            assert play(env, actions, seed=2) == wanted
-    assert not recorder.buffer
+    before = specialisations()
+    for actions in (frozen, strided, signs.astype(float), signs.astype(int), signs.tolist()):
+        assert play(env, actions, seed=2) == wanted
+    assert specialisations() == before
 
 
 @pytest.mark.parametrize("env_id", IDS)
@@ -256,17 +265,21 @@ def test_rendering(env_id):
     env.close()
     env.close()
 
-    # Pictures neither show nor change what a world does.
-    silent = gym.make(env_id)
-    actions = some_actions(env_id, 20)
-    drawn = gym.make(env_id, render_mode="human")
-    begin(drawn, seed=5), begin(silent, seed=5)
-    for action in actions:
-        shown, hidden = drawn.step(action), silent.step(action)
-        assert drawn.render() is None
-        assert shown[0].tobytes() == hidden[0].tobytes() and shown[1:] == hidden[1:]
-    drawn.close()
-    drawn.close()
+
+@pytest.mark.parametrize("env_id", IDS)
+def test_a_window_follows_every_step_and_changes_nothing(env_id):
+    pygame = pytest.importorskip("pygame")
+    shown, hidden = gym.make(env_id, render_mode="human"), gym.make(env_id)
+    assert begin(shown, seed=5) == begin(hidden, seed=5)
+    pictures = []
+    for action in some_actions(env_id, 10):
+        # Nobody has to call render in this mode.
+        pictures.append(pygame.surfarray.array3d(pygame.display.get_surface()))
+        assert go_on(shown, [action]) == go_on(hidden, [action])
+    assert all((a != b).any() for a, b in itertools.pairwise(pictures))
+    assert shown.render() is None
+    shown.close()
+    shown.close()
 
 
 @pytest.mark.parametrize("env_id", IDS)
@@ -288,3 +301,17 @@ def test_global_random_numbers_are_neither_used_nor_drawn(env_id):
         after = np.random.get_state(legacy=True), random.getstate()
         assert str(before) == str(after)
     assert played[0] == played[1]
+
+
+@pytest.mark.parametrize("env_id", IDS)
+def test_starts_without_a_seed_do_not_hang_on_global_random_numbers(env_id):
+    starts = []
+    for _ in range(2):
+        np.random.seed(0)
+        random.seed(0)
+        before = np.random.get_state(legacy=True), random.getstate()
+        starts.append(begin(gym.make(env_id)))
+        starts.append(gym.make_vec(env_id, 1).reset()[0].tobytes())
+        after = np.random.get_state(legacy=True), random.getstate()
+        assert str(before) == str(after)
+    assert len(set(starts)) == 4

@@ -36,7 +36,7 @@ def test_sections(env_id):
     found = sections(env_id)
     assert list(found) == SECTIONS
     assert all(text.strip() for text in found.values())
-    # Step, error and scores are figures.
+    # Step, measured error and scores are figures.
     assert all(re.search(r"\d", found[heading]) for heading in ("Physics", "Baselines"))
 
 
@@ -58,7 +58,8 @@ def test_action_table(env_id):
     assert [row["Num"] for row in rows] == [str(index) for index in range(len(names))]
     for row, name in zip(rows, names, strict=True):
         assert row["Action"] == name
-        assert (float(row["Min"]), float(row["Max"])) == (-1.0, 1.0)
+        # What the bounds stand for may follow them: "1 (3 m/s)".
+        assert [float(row[end].split()[0]) for end in ("Min", "Max")] == [-1.0, 1.0]
         assert row["Unit"]
 
 

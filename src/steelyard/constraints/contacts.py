@@ -78,6 +78,9 @@ def contact_targets(tape, s, dt, skip):
         store(s, tape[contact + 18] + 1, select(low, splat(1.0 - _RECOVERY) * gap, zero))
         store(s, tape[contact + 18] + 2, bounce)
         store(s, tape[contact + 18] + 3, select(low, one, zero))
+        for axis in range(3):
+            row = tape[contact + 15] + axis
+            store(s, row, select(near, load(s, row), zero))
         left_out = 0 if any_lane(near) else 1
         changed = changed or skip[tape[contact + 20]] != left_out or tape[contact] != GROUND
         skip[tape[contact + 20]] = left_out

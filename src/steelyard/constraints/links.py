@@ -8,7 +8,7 @@ the multiplier is a mass.
 from __future__ import annotations
 
 from ..kernel import inner
-from ..math.lanes import fma, load, select, splat, store
+from ..math.lanes import fma, load, select, splat, sqrt, store
 from ..model.tape import H_LINKS, LINK
 
 
@@ -68,6 +68,12 @@ def link_targets(tape, s, dt):
             store(s, tape[link + 14], follow)
         else:
             closing = link_rate(s, link, tape) - length * rate
+            # The rebound is a rate of g at full length; the closing was measured short of it.
+            d = tape[link + 13]
+            square = load(s, d) * load(s, d)
+            square = fma(load(s, d + 1), load(s, d + 1), square)
+            square = fma(load(s, d + 2), load(s, d + 2), square)
+            closing = closing * length / sqrt(select(square > zero, square, splat(1.0)))
             rebound = select(closing > zero, closing * load(s, tape[link + 11]), zero)
             store(s, tape[link + 14], follow - rebound)
             over = link_half_square(s, link, tape, length) > splat(1e-9) * length * length

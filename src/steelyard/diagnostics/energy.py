@@ -41,12 +41,12 @@ def potential_energy(world: World) -> np.ndarray:
         elif isinstance(force, Buoyancy):
             total = total + _buoyancy(world, force)
         elif isinstance(force, Gravity):
-            chosen = force.particles or world.scene.particles
+            chosen = world.scene.particles if force.particles is None else force.particles
             for p in map(world._index, chosen):
                 along = (world[force].acceleration * particles.position[:, p]).sum(axis=-1)
                 total = total - particles.mass_or_zero[:, p] * along
-        elif isinstance(force, UserForce) and force.energy is not None:
-            total = total + np.asarray(force.energy(particles.position))
+        elif isinstance(force, UserForce):
+            total = total + force.potential(particles.position)
     return total
 
 

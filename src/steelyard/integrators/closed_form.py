@@ -13,13 +13,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
 from ..kernel import inner, kernel
 from ..math.lanes import fma, load, store
 from ..model.tape import CLOSED_FORM, H_ACCELERATION, H_DAMPING, H_DRIFT, H_POSITION, H_VELOCITY
+from ..scene import checks
 from .base import Integrator
 
 
@@ -132,6 +133,20 @@ def flight_fall_time(height, velocity, acceleration, rate):
     return math.inf if extreme > 0.0 else _newton(height, velocity, acceleration, rate, 0.0)
 
 
+def _points(name: str, value: Any) -> np.ndarray:
+    """``value`` as finite points, shape (..., 3)."""
+    try:
+        points = np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        points = np.empty(0)
+    if points.shape[-1:] != (3,) or not np.isfinite(points).all():
+        raise ValueError(
+            f"flight_impact: {name} is {value!r}; it must be finite, of shape (..., 3). "
+            "Give x, y, z of every particle."
+        )
+    return points
+
+
 def flight_impact(
     position: np.ndarray,
     velocity: np.ndarray,
@@ -153,23 +168,25 @@ def flight_impact(
         Times (...) [s], inf where it never falls through, and places (..., 3) [m], NaN there.
 
     Raises:
-        ValueError: damping out of range.
+        ValueError: damping out of range, or a value that is not finite or of another shape.
     """
-    if not 0.0 < damping <= 1.0:
-        raise ValueError(
-            f"flight_impact: damping is {damping!r}; it must be in (0, 1]. Use 1 for no damping."
-        )
-    x = np.asarray(position, dtype=np.float64)
-    v = np.asarray(velocity, dtype=np.float64)
+    owner = "flight_impact"
+    pull = checks.vector(owner, "acceleration", acceleration)
+    share = checks.number(
+        owner, "damping", damping, above=0.0, most=1.0, remedy="Use 1 for no damping."
+    )
+    level = checks.number(owner, "height", height, remedy="Give the level in metres.")
+    x = _points("position", position)
+    v = _points("velocity", velocity)
     shape = np.broadcast_shapes(x.shape, v.shape)
     points = np.broadcast_to(x, shape).reshape(-1, 3)
     speeds = np.broadcast_to(v, shape).reshape(-1, 3)
-    rate = -math.log(damping)
+    rate = -math.log(share)
     times = np.empty(len(points))
     places = np.full((len(points), 3), np.nan)
     for k, (point, speed) in enumerate(zip(points, speeds, strict=True)):
-        times[k] = flight_fall_time(point[1] - height, speed[1], acceleration[1], rate)
+        times[k] = flight_fall_time(point[1] - level, speed[1], pull[1], rate)
         if math.isfinite(times[k]):
             for c in range(3):
-                places[k, c] = flight(point[c], speed[c], float(acceleration[c]), rate, times[k])[0]
+                places[k, c] = flight(point[c], speed[c], pull[c], rate, times[k])[0]
     return times.reshape(shape[:-1]), places.reshape(shape)

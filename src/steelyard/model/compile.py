@@ -8,7 +8,13 @@ from typing import Any
 import numpy as np
 
 from ..methods import Method
-from ..scene.contacts import ContactGenerator, Ground, LinePlatform
+from ..scene.contacts import (
+    ContactGenerator,
+    Ground,
+    LinePlatform,
+    check_span,
+    check_thickness,
+)
 from ..scene.forces import (
     AnchoredBungee,
     AnchoredSpring,
@@ -162,7 +168,7 @@ class Compiler:
         header["user_forces"] = self.state((PARTICLES, "user"), [0.0] * 3 * count) if user else -1
         self._user_contacts()
         if self.method.solver is not None and self.method.solver.code == tape.WORST_FIRST:
-            most = max(len(self.links) + len(self.contacts), 1)
+            most = len(self.links) + len(self.contacts)
             header["moves"] = self.state((PARTICLES, "moves"), np.zeros(6 * most))
         header["time"] = self.state((PARTICLES, "time"), [0.0])
         header["unsettled"] = self.state((PARTICLES, "unsettled"), [0.0])
@@ -507,9 +513,21 @@ class Compiler:
             assert height == normal + 3
             return normal
         if isinstance(generator, LinePlatform):
-            start = self.parameter(generator, "start", generator.start)
-            self.parameter(generator, "end", generator.end)
-            self.parameter(generator, "radius", generator.radius)
+            declared = self.parameters
+            particles = [a for other, a, _, _ in self.contacts if other is generator]
+
+            def check_start(given: np.ndarray) -> None:
+                check_span(given, declared.values[generator, "end"])
+
+            def check_end(given: np.ndarray) -> None:
+                check_span(declared.values[generator, "start"], given)
+
+            def check_radius(given: np.ndarray) -> None:
+                check_thickness(float(given.min()), particles)
+
+            start = self.parameter(generator, "start", generator.start, check=check_start)
+            self.parameter(generator, "end", generator.end, check=check_end)
+            self.parameter(generator, "radius", generator.radius, check=check_radius)
             return start
         return -1
 

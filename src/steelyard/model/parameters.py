@@ -1,8 +1,9 @@
 """Parameters of a model: values that a person may assign, shared by all worlds or one per world.
 
-A parameter is stored as a person gives it, (size,) if shared and (size, worlds) if per world. ``Slot`` is a
-group of scratch rows computed from one or more of them. Shared slots are written into every scratch once;
-slots that differ between worlds are laid out in one array that the stepping kernel copies in.
+A parameter is stored as a person gives it, (size,) if shared and (size, worlds) if per world.
+``Slot`` is a group of scratch rows computed from one or more of them. Shared slots are written into
+every scratch once; slots that differ between worlds are laid out in one array that the stepping
+kernel copies in.
 """
 
 from __future__ import annotations
@@ -39,7 +40,14 @@ class Parameters:
     def declare(
         self, key: Key, value: Any, check: Callable[[np.ndarray], None] | None = None
     ) -> None:
-        """Make ``value`` (a scalar or a vector) assignable under ``key``."""
+        """Make ``value`` (a scalar or a vector) assignable under ``key``.
+
+        Args:
+            key: the thing and the parameter's name.
+            value: what it is until something is assigned.
+            check: raises where what is to be assigned does not go with other parameters; what the
+                parameter alone must be, the thing's ``LIMITS`` say.
+        """
         self.values[key] = np.atleast_1d(np.asarray(value, dtype=np.float64))
         if check is not None:
             self.checks[key] = check

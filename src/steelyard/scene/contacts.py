@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
 from . import checks
-from .particle import Particle
+from .particle import Particle, check_particles
 
-
-def _surface(owner: str, restitution: float, friction: float) -> tuple[float, float]:
-    return (
-        checks.number(
-            owner, "restitution", restitution, least=0.0, most=1.0, remedy="1 loses no energy."
-        ),
-        checks.number(owner, "friction", friction, least=0.0, remedy="0 is frictionless."),
-    )
+_SURFACE: dict[str, checks.Rule] = {
+    "restitution": checks.Limit(least=0.0, most=1.0, remedy="1 loses no energy."),
+    "friction": checks.Limit(least=0.0, remedy="0 is frictionless."),
+}
 
 
 @dataclass(eq=False, kw_only=True)
@@ -30,8 +26,8 @@ class Ground:
         normal: direction out of the ground; made a unit vector.
         restitution: rebound speed over impact speed, in [0, 1].
         friction: Coulomb coefficient, at least 0.
-        particles: those that can touch it; all movable ones of the scene by default. Each costs three
-            rows in a solver: name only those that can get there.
+        particles: those that can touch it; all movable ones of the scene by default. Each costs
+            three rows in a solver: name only those that can get there.
     """
 
     height: float = 0.0
@@ -40,16 +36,17 @@ class Ground:
     friction: float = 0.0
     particles: Sequence[Particle] | None = None
 
+    LIMITS: ClassVar[dict[str, checks.Rule]] = _SURFACE | {
+        "height": checks.Limit(remedy="Give the plane's distance from the origin."),
+        "normal": checks.Direction(remedy="Use (0, 1, 0) for up."),
+    }
+
     def __post_init__(self) -> None:
-        self.height = checks.number(
-            "Ground", "height", self.height, remedy="Give the plane's distance from the origin."
-        )
-        normal = np.asarray(checks.vector("Ground", "normal", self.normal))
-        size = float(np.linalg.norm(normal))
-        checks.number("Ground", "length of normal", size, above=0.0, remedy="Use (0, 1, 0) for up.")
-        x, y, z = (normal / size).tolist()
-        self.normal = (x, y, z)
-        self.restitution, self.friction = _surface("Ground", self.restitution, self.friction)
+        checks.numbers(self, "height", "restitution", "friction")
+        checks.vectors(self, "normal")
+        normal = self.LIMITS["normal"].check("Ground", "normal", np.asarray(self.normal))
+        self.normal = tuple(normal.tolist())
+        check_particles(self, "particles")
 
 
 @dataclass(eq=False, kw_only=True)
@@ -72,17 +69,50 @@ class LinePlatform:
     friction: float = 0.0
     particles: Sequence[Particle] | None = None
 
+    LIMITS: ClassVar[dict[str, checks.Rule]] = _SURFACE | {
+        "radius": checks.Limit(least=0.0, remedy="Use 0 for a bare line."),
+    }
+
     def __post_init__(self) -> None:
-        self.start = checks.vector("LinePlatform", "start", self.start)
-        self.end = checks.vector("LinePlatform", "end", self.end)
-        span = float(np.linalg.norm(np.subtract(self.end, self.start)))
-        checks.number(
-            "LinePlatform", "distance from start to end", span, above=0.0, remedy="Move an end."
+        checks.vectors(self, "start", "end")
+        check_span(np.asarray(self.start), np.asarray(self.end))
+        checks.numbers(self, "radius", "restitution", "friction")
+        check_particles(self, "particles")
+
+
+def check_span(start: np.ndarray, end: np.ndarray) -> None:
+    """Refuse a line platform of no length; both ends (3,) or (3, worlds).
+
+    Raises:
+        ValueError: the ends are at the same place, or further apart than a float can tell.
+    """
+    starts, ends = np.broadcast_arrays(start.reshape(3, -1), end.reshape(3, -1))
+    with np.errstate(over="ignore"):
+        spans = np.linalg.norm(ends - starts, axis=0)
+    bad = ~(np.isfinite(spans) & (spans > 0.0))
+    if bad.any():
+        w = int(bad.argmax())
+        where = f" in world {w}" if len(bad) > 1 else ""
+        raise ValueError(
+            f"LinePlatform: start is {tuple(starts[:, w].tolist())} and end is "
+            f"{tuple(ends[:, w].tolist())}{where}, distance from start to end {float(spans[w])!r}; "
+            "it must be finite and greater than 0. Move an end."
         )
-        self.radius = checks.number(
-            "LinePlatform", "radius", self.radius, least=0.0, remedy="Use 0 for a bare line."
-        )
-        self.restitution, self.friction = _surface("LinePlatform", self.restitution, self.friction)
+
+
+def check_thickness(radius: float, particles: Iterable[Particle]) -> None:
+    """Refuse a line platform that one of its particles can never touch.
+
+    Raises:
+        ValueError: neither the bar nor the particle has a radius.
+    """
+    for particle in particles:
+        if radius == 0.0 and particle.radius == 0.0:
+            raise ValueError(
+                f"LinePlatform: radius is {radius} and that of the particle at "
+                f"{particle.position} is 0.0; one of them must be greater than 0, or they never "
+                "touch. Give one a radius, or name only particles that have one."
+            )
 
 
 @dataclass(eq=False)
@@ -90,10 +120,12 @@ class ContactGenerator:
     """Contacts written by the user.
 
     ``function(position_a, position_b, time)`` is called before each step with arrays of shape
-    (worlds, pairs, 3) [m] and times of shape (worlds,) [s]; ``position_b`` repeats ``position_a`` where the
-    pair's second member is None (scenery). It returns ``(normal, penetration)`` of shapes (worlds, pairs, 3)
-    and (worlds, pairs) [m]: the unit normal points from b (or scenery) to a; a penetration of 0 or less is
-    no contact. A numba function of the same arrays may be given; it is called the same way.
+    (worlds, pairs, 3) [m] and times of shape (worlds,) [s]; ``position_b`` repeats ``position_a``
+    where the pair's second member is None (scenery). It returns ``(normal, penetration)`` of shapes
+    (worlds, pairs, 3) and (worlds, pairs) [m]: the unit normal points from b (or scenery) to a; a
+    penetration of 0 or less is no contact, whatever its normal. A world in which a contact is not
+    finite is flagged in ``world.health`` and goes on without it. A numba function of the same
+    arrays may be given; it is called the same way.
 
     Args:
         function: the generator.
@@ -107,16 +139,72 @@ class ContactGenerator:
     restitution: float = 0.0
     friction: float = 0.0
 
+    LIMITS: ClassVar = _SURFACE
+
     def __post_init__(self) -> None:
-        self.pairs = tuple(self.pairs)
-        if not callable(self.function) or not self.pairs:
-            raise ValueError(
-                f"ContactGenerator: function is {self.function!r} with {len(self.pairs)} pairs; it needs "
-                "a callable and at least one pair. Name the pairs that may touch."
+        if not callable(self.function):
+            raise TypeError(
+                f"ContactGenerator: function is {self.function!r}; it must be callable as "
+                "function(position_a, position_b, time). Pass the function itself, not its result."
             )
-        self.restitution, self.friction = _surface(
-            "ContactGenerator", self.restitution, self.friction
-        )
+        try:
+            pairs = tuple((a, b) for a, b in self.pairs)
+        except (TypeError, ValueError):
+            pairs = ()
+        if not pairs or not all(_is_pair(a, b) for a, b in pairs):
+            raise ValueError(
+                f"ContactGenerator: pairs is {self.pairs!r}; it must be at least one pair "
+                "(Particle, another Particle or None for scenery). Name the pairs that may touch."
+            )
+        self.pairs = pairs
+        checks.numbers(self, "restitution", "friction")
+
+    def evaluate(
+        self, position_a: np.ndarray, position_b: np.ndarray, time: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Contacts at the places of the pairs, (worlds, pairs, 3) [m], and times (worlds,) [s].
+
+        Returns:
+            Normals (worlds, pairs, 3), penetrations (worlds, pairs) [m], and in which worlds a
+            contact was not finite (worlds,); it is none here.
+
+        Raises:
+            ValueError: what the function returned has not these shapes, or a normal is no unit
+                vector.
+        """
+        shape = position_a.shape
+        given = self.function(position_a, position_b, time)
+        try:
+            normal, depth = map(checks.floats, given)
+        except (TypeError, ValueError):
+            normal = depth = None
+        if normal is None or depth is None or (normal.shape, depth.shape) != (shape, shape[:2]):
+            parts = given if isinstance(given, tuple | list) else (given,)
+            raise ValueError(
+                "ContactGenerator: the function returned "
+                f"{' and '.join(map(checks.described, parts))}; it must return (normal, "
+                f"penetration) of shapes {shape} and {shape[:2]} (worlds, pairs). Return one "
+                "contact per pair."
+            )
+        touching = ~(depth <= 0.0)
+        finite = np.isfinite(normal).all(axis=2)
+        broken = touching & ~(finite & np.isfinite(depth))
+        size = np.linalg.norm(normal, axis=2)
+        wrong = touching & ~broken & ~(np.abs(size - 1.0) < 1e-6)
+        if wrong.any():
+            w, k = np.unravel_index(wrong.argmax(), wrong.shape)
+            raise ValueError(
+                f"ContactGenerator: the normal of pair {k} in world {w} is "
+                f"{tuple(normal[w, k].tolist())} of length {size[w, k]:g}; it must be a unit "
+                "vector. Divide it by its length."
+            )
+        # Kernels compute with the normal of what does not touch too, before they mask it.
+        normal = np.where(finite[..., None], normal, (0.0, 1.0, 0.0))
+        return normal, np.where(broken, 0.0, depth), broken.any(axis=1)
+
+
+def _is_pair(a: Any, b: Any) -> bool:
+    return isinstance(a, Particle) and (b is None or isinstance(b, Particle)) and a is not b
 
 
 Contacts = Ground | LinePlatform | ContactGenerator

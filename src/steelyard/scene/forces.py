@@ -1,33 +1,30 @@
-"""Forces as a person writes them; their kernels are the files of the same names in ``steelyard.forces``."""
+"""Forces as a person writes them; their kernels have the same names in ``steelyard.forces``."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
+
+import numpy as np
 
 from . import checks
-from .particle import Particle
+from .particle import Particle, check_ends, check_particles
 
-
-def _stiffness(owner: str, value: float) -> float:
-    return checks.number(
-        owner, "stiffness", value, above=0.0, remedy="Give newtons per metre of stretch."
-    )
-
-
-def _rest(owner: str, value: float) -> float:
-    return checks.number(owner, "rest_length", value, least=0.0, remedy="Give metres.")
-
-
-def _distinct(owner: str, a: Particle, b: Particle) -> None:
-    if a is b:
-        raise ValueError(f"{owner}: a and b are the same particle; it needs two. Give another.")
+_STIFFNESS = checks.Limit(above=0.0, remedy="Give newtons per metre of stretch.")
+_SPRING: dict[str, checks.Rule] = {
+    "stiffness": _STIFFNESS,
+    "rest_length": checks.Limit(least=0.0, remedy="Give metres."),
+}
+_DRAG = checks.Limit(least=0.0, remedy="Less would feed energy in; use 0 for none.")
+_POSITIVE = checks.Limit(above=0.0)
 
 
 @dataclass(eq=False)
 class Gravity:
-    """F = m g on each of its particles; immovable ones feel nothing (Millington, *Game Physics*, ch. 5).
+    """F = m g on each of its particles; immovable ones feel nothing.
+
+    Source: Millington, *Game Physics Engine Development*, ch. 5.
 
     Args:
         acceleration: g [m/s^2], added to what the scene's gravity gives.
@@ -37,8 +34,11 @@ class Gravity:
     acceleration: checks.Vector
     particles: Sequence[Particle] | None = None
 
+    LIMITS: ClassVar[dict[str, checks.Rule]] = {}
+
     def __post_init__(self) -> None:
-        self.acceleration = checks.vector("Gravity", "acceleration", self.acceleration)
+        checks.vectors(self, "acceleration")
+        check_particles(self, "particles")
 
 
 @dataclass(eq=False)
@@ -57,13 +57,12 @@ class Drag:
     wind: checks.Vector = (0.0, 0.0, 0.0)
     particles: Sequence[Particle] | None = None
 
+    LIMITS: ClassVar[dict[str, checks.Rule]] = {"linear": _DRAG, "quadratic": _DRAG}
+
     def __post_init__(self) -> None:
-        remedy = "Negative drag would feed energy in; use 0 for none."
-        self.linear = checks.number("Drag", "linear", self.linear, least=0.0, remedy=remedy)
-        self.quadratic = checks.number(
-            "Drag", "quadratic", self.quadratic, least=0.0, remedy=remedy
-        )
-        self.wind = checks.vector("Drag", "wind", self.wind)
+        checks.numbers(self, "linear", "quadratic")
+        checks.vectors(self, "wind")
+        check_particles(self, "particles")
 
 
 @dataclass(eq=False)
@@ -82,10 +81,11 @@ class Spring:
     stiffness: float
     rest_length: float
 
+    LIMITS: ClassVar = _SPRING
+
     def __post_init__(self) -> None:
-        _distinct(type(self).__name__, self.a, self.b)
-        self.stiffness = _stiffness(type(self).__name__, self.stiffness)
-        self.rest_length = _rest(type(self).__name__, self.rest_length)
+        check_ends(self, "a", "b")
+        checks.numbers(self, "stiffness", "rest_length")
 
 
 @dataclass(eq=False)
@@ -109,10 +109,12 @@ class AnchoredSpring:
     stiffness: float
     rest_length: float
 
+    LIMITS: ClassVar = _SPRING
+
     def __post_init__(self) -> None:
-        self.anchor = checks.vector(type(self).__name__, "anchor", self.anchor)
-        self.stiffness = _stiffness(type(self).__name__, self.stiffness)
-        self.rest_length = _rest(type(self).__name__, self.rest_length)
+        check_ends(self, "particle")
+        checks.vectors(self, "anchor")
+        checks.numbers(self, "stiffness", "rest_length")
 
 
 @dataclass(eq=False)
@@ -122,10 +124,10 @@ class AnchoredBungee(AnchoredSpring):
 
 @dataclass(eq=False)
 class StiffSpring:
-    """Anchored damped spring of zero rest length, m x'' = -k x - c x', stepped by its exact solution.
+    """Anchored damped spring of zero rest length, m x'' = -k x - c x', by its exact solution.
 
-    Stable and exact for every stiffness, damping and step; other forces on the particle count as constant
-    over a step. A particle has at most one, and no link, rider or contact.
+    Stable and exact for every stiffness, damping and step; other forces on the particle count as
+    constant over a step. A particle has at most one, and no link, rider or contact.
 
     Args:
         particle: the moving end.
@@ -139,17 +141,20 @@ class StiffSpring:
     stiffness: float
     damping: float = 0.0
 
+    LIMITS: ClassVar[dict[str, checks.Rule]] = {
+        "stiffness": _STIFFNESS,
+        "damping": checks.Limit(least=0.0, remedy="Use 0 for no damping."),
+    }
+
     def __post_init__(self) -> None:
-        self.anchor = checks.vector("StiffSpring", "anchor", self.anchor)
-        self.stiffness = _stiffness("StiffSpring", self.stiffness)
-        self.damping = checks.number(
-            "StiffSpring", "damping", self.damping, least=0.0, remedy="Use 0 for no damping."
-        )
+        check_ends(self, "particle")
+        checks.vectors(self, "anchor")
+        checks.numbers(self, "stiffness", "damping")
 
 
 @dataclass(eq=False)
 class Buoyancy:
-    """Lift of a liquid with a level surface: rho V g below, 0 above, linear over the height 2 d between.
+    """Lift of a liquid with a level surface: rho V g below, 0 above, linear between.
 
     F_y = rho V g (h + d - y) / (2 d) for y in [h - d, h + d].
 
@@ -169,13 +174,17 @@ class Buoyancy:
     density: float = 1000.0
     gravity: float = 9.81
 
+    LIMITS: ClassVar[dict[str, checks.Rule]] = {
+        "surface": checks.Limit(remedy="Give metres."),
+        "half_depth": _POSITIVE,
+        "volume": _POSITIVE,
+        "density": _POSITIVE,
+        "gravity": _POSITIVE,
+    }
+
     def __post_init__(self) -> None:
-        self.surface = checks.number("Buoyancy", "surface", self.surface, remedy="Give metres.")
-        for name in ("half_depth", "volume", "density", "gravity"):
-            value = checks.number(
-                "Buoyancy", name, getattr(self, name), above=0.0, remedy="Give SI units."
-            )
-            setattr(self, name, value)
+        check_ends(self, "particle")
+        checks.numbers(self, *self.LIMITS)
 
 
 @dataclass(eq=False)
@@ -184,8 +193,9 @@ class UserForce:
 
     ``function(position, velocity, time)`` is called at each evaluation with arrays of shapes
     (worlds, particles, 3) [m], [m/s] and (worlds,) [s] and returns the forces [N], shape
-    (worlds, particles, 3). A numba function of the same arrays may be given; it is called the same way.
-    Where it depends on velocity, velocity Verlet is first order in that part.
+    (worlds, particles, 3). The arrays are copies of its own. A numba function of the same arrays
+    may be given; it is called the same way. Where it depends on velocity, velocity Verlet is first
+    order in that part.
 
     Args:
         function: the force.
@@ -197,12 +207,54 @@ class UserForce:
     particles: Sequence[Particle] | None = None
     energy: Callable[..., Any] | None = None
 
+    LIMITS: ClassVar[dict[str, checks.Rule]] = {}
+
     def __post_init__(self) -> None:
         if not callable(self.function):
-            raise ValueError(
+            raise TypeError(
                 f"UserForce: function is {self.function!r}; it must be callable as "
                 "function(position, velocity, time). Pass the function itself, not its result."
             )
+        if self.energy is not None and not callable(self.energy):
+            raise TypeError(
+                f"UserForce: energy is {self.energy!r}; it must be None or callable as "
+                "energy(position). Pass the function itself, not its result."
+            )
+        check_particles(self, "particles")
+
+    def evaluate(self, position: np.ndarray, velocity: np.ndarray, time: np.ndarray) -> np.ndarray:
+        """Forces [N] on all particles, (worlds, particles, 3), as ``position`` and ``velocity``.
+
+        Raises:
+            ValueError: the function returned something else.
+        """
+        given = self.function(position.copy(), velocity.copy(), time.copy())
+        force = checks.floats(given)
+        if force is None or force.shape != position.shape:
+            raise ValueError(
+                f"UserForce: the function returned {checks.described(given)}; it must return an "
+                f"array of shape {position.shape} (worlds, particles, 3). Return one force per "
+                "particle."
+            )
+        return force
+
+    def potential(self, position: np.ndarray) -> np.ndarray:
+        """Energy [J], (worlds,), at positions (worlds, particles, 3); 0 where it brings none.
+
+        Raises:
+            ValueError: the function returned something else.
+        """
+        shape = position.shape[:1]
+        if self.energy is None:
+            return np.zeros(shape)
+        given = self.energy(position.copy())
+        energy = checks.floats(given)
+        if energy is None or energy.shape != shape:
+            raise ValueError(
+                f"UserForce: energy returned {checks.described(given)}; it must return an array of "
+                f"shape {shape} (worlds,). Return one number per world."
+            )
+        return energy
 
 
 Force = (

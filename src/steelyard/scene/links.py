@@ -1,35 +1,23 @@
-"""Links: rods of fixed length and cables of maximum length, between particles or to a fixed point."""
+"""Links: rods of fixed length, cables of maximum length, between particles or to a fixed point."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
 from . import checks
-from .particle import Particle
+from .particle import Particle, check_ends
 
-
-def _length(owner: str, name: str, value: float) -> float:
-    return checks.number(
-        owner, name, value, above=0.0, remedy="Give the distance in metres that the link holds."
-    )
-
-
-def _restitution(owner: str, value: float) -> float:
-    return checks.number(
-        owner,
-        "restitution",
-        value,
-        least=0.0,
-        most=1.0,
-        remedy="0 is no rebound, 1 loses no energy.",
-    )
-
-
-def _distinct(owner: str, a: Particle, b: Particle) -> None:
-    if a is b:
-        raise ValueError(f"{owner}: a and b are the same particle; a link needs two. Give another.")
+_LENGTH = checks.Limit(above=0.0, remedy="Give the distance in metres that the link holds.")
+_ROD: dict[str, checks.Rule] = {"length": _LENGTH}
+# A world calls the length that a cable has now ``length``, as that of a rod.
+_CABLE: dict[str, checks.Rule] = {
+    "max_length": _LENGTH,
+    "length": _LENGTH,
+    "restitution": checks.Limit(least=0.0, most=1.0, remedy="0 is no rebound, 1 loses no energy."),
+}
 
 
 def _distance(a: Particle, other: checks.Vector) -> float:
@@ -50,10 +38,13 @@ class Rod:
     b: Particle
     length: float | None = None
 
+    LIMITS: ClassVar = _ROD
+
     def __post_init__(self) -> None:
-        _distinct("Rod", self.a, self.b)
-        length = _distance(self.a, self.b.position) if self.length is None else self.length
-        self.length = _length("Rod", "length", length)
+        check_ends(self, "a", "b")
+        if self.length is None:
+            self.length = _distance(self.a, self.b.position)
+        checks.numbers(self, "length")
 
 
 @dataclass(eq=False)
@@ -70,10 +61,14 @@ class RodConstraint:
     anchor: checks.Vector
     length: float | None = None
 
+    LIMITS: ClassVar = _ROD
+
     def __post_init__(self) -> None:
-        self.anchor = checks.vector("RodConstraint", "anchor", self.anchor)
-        length = _distance(self.particle, self.anchor) if self.length is None else self.length
-        self.length = _length("RodConstraint", "length", length)
+        check_ends(self, "particle")
+        checks.vectors(self, "anchor")
+        if self.length is None:
+            self.length = _distance(self.particle, self.anchor)
+        checks.numbers(self, "length")
 
 
 @dataclass(eq=False)
@@ -85,8 +80,9 @@ class Cable:
         b: the other particle.
         max_length: greatest distance [m], above 0.
         restitution: speed of parting over speed of approach when the cable snaps taut, in [0, 1].
-        winch: whether ``world[cable].rate`` [m/s] and ``world[cable].acceleration`` [m/s^2] lengthen it as the
-            world steps; a rate that jumps is a blow.
+        winch: whether ``world[cable].rate`` [m/s] and ``world[cable].acceleration`` [m/s^2]
+            lengthen it as the world steps; a rate that jumps is a blow. One wound up to nothing is
+            flagged in ``world.health``.
     """
 
     a: Particle
@@ -95,10 +91,11 @@ class Cable:
     restitution: float = 0.0
     winch: bool = False
 
+    LIMITS: ClassVar = _CABLE
+
     def __post_init__(self) -> None:
-        _distinct("Cable", self.a, self.b)
-        self.max_length = _length("Cable", "max_length", self.max_length)
-        self.restitution = _restitution("Cable", self.restitution)
+        check_ends(self, "a", "b")
+        checks.numbers(self, "max_length", "restitution")
 
 
 @dataclass(eq=False)
@@ -110,8 +107,9 @@ class CableConstraint:
         anchor: the point [m]; may be assigned between steps.
         max_length: greatest distance [m], above 0.
         restitution: speed of parting over speed of approach when the cable snaps taut, in [0, 1].
-        winch: whether ``world[cable].rate`` [m/s] and ``world[cable].acceleration`` [m/s^2] lengthen it as the
-            world steps; a rate that jumps is a blow.
+        winch: whether ``world[cable].rate`` [m/s] and ``world[cable].acceleration`` [m/s^2]
+            lengthen it as the world steps; a rate that jumps is a blow. One wound up to nothing is
+            flagged in ``world.health``.
     """
 
     particle: Particle
@@ -120,10 +118,12 @@ class CableConstraint:
     restitution: float = 0.0
     winch: bool = False
 
+    LIMITS: ClassVar = _CABLE
+
     def __post_init__(self) -> None:
-        self.anchor = checks.vector("CableConstraint", "anchor", self.anchor)
-        self.max_length = _length("CableConstraint", "max_length", self.max_length)
-        self.restitution = _restitution("CableConstraint", self.restitution)
+        check_ends(self, "particle")
+        checks.vectors(self, "anchor")
+        checks.numbers(self, "max_length", "restitution")
 
 
 Link = Rod | RodConstraint | Cable | CableConstraint

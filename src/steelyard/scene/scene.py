@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import Any, TypeVar
 
 from . import checks
-from .contacts import ContactGenerator, Ground, LinePlatform
+from .contacts import ContactGenerator, Ground, LinePlatform, check_thickness
 from .forces import (
     AnchoredBungee,
     AnchoredSpring,
@@ -43,9 +43,8 @@ Thing = TypeVar("Thing")
 def members(thing: Any) -> Iterator[Particle]:
     """The particles that a link, rider, contact generator or force refers to."""
     for name in ("a", "b", "particle"):
-        value = getattr(thing, name, None)
-        if value is not None:
-            yield value
+        if hasattr(thing, name):
+            yield getattr(thing, name)
     yield from getattr(thing, "particles", None) or ()
     yield from getattr(thing, "deck", ())
     for pair in getattr(thing, "pairs", ()):
@@ -81,15 +80,16 @@ class Scene:
         for particle in members(thing):
             if particle not in self:
                 raise ValueError(
-                    f"Scene.add: this {name} refers to a particle at {particle.position} that is not in "
-                    "this scene; both must belong to the same scene. Add the particle first."
+                    f"Scene.add: this {name} refers to a particle at {particle.position} that is "
+                    "not in this scene; both must belong to the same scene. Add the particle first."
                 )
         if isinstance(thing, StiffSpring) and any(
             force.particle is thing.particle for force in self.of(StiffSpring)
         ):
             raise ValueError(
-                f"Scene.add: the particle at {thing.particle.position} has a StiffSpring already; the "
-                "limit is 1 per particle, since its solution is exact only alone. Use AnchoredSpring."
+                f"Scene.add: the particle at {thing.particle.position} has a StiffSpring already; "
+                "the limit is 1 per particle, since its solution is exact only alone. Use "
+                "AnchoredSpring."
             )
         self.things.append(thing)
         return thing
@@ -101,13 +101,36 @@ class Scene:
             ValueError: it is not in the scene, or something left in the scene refers to it.
         """
         if thing not in self:
-            raise ValueError(f"Scene.remove: this {type(thing).__name__} is not in the scene.")
+            raise ValueError(
+                f"Scene.remove: this {type(thing).__name__} is not in the scene; only what was "
+                "added can be removed. Give the very thing that Scene.add returned."
+            )
         for other in self.things:
             if other is not thing and any(particle is thing for particle in members(other)):
                 raise ValueError(
-                    f"Scene.remove: a {type(other).__name__} still refers to this particle; remove that first."
+                    f"Scene.remove: a {type(other).__name__} still refers to this particle; remove "
+                    "that first."
                 )
         self.things = [other for other in self.things if other is not thing]
+
+    def touched(self, thing: Any) -> list[Particle]:
+        """The particles that a link, rider or contact generator may push."""
+        if isinstance(thing, Ground | LinePlatform) and thing.particles is None:
+            return [particle for particle in self.particles if particle.movable]
+        return list(members(thing))
+
+    def check(self) -> None:
+        """Make sure that worlds of this scene mean something.
+
+        Raises:
+            ValueError: no particle, or a line platform that one of its particles can never touch.
+        """
+        if not self.particles:
+            raise ValueError(
+                "Scene: the scene has 0 particles; it must have at least 1. Add a Particle."
+            )
+        for line in self.of(LinePlatform):
+            check_thickness(line.radius, self.touched(line))
 
     def of(self, *kinds: type) -> list[Any]:
         """The things of exactly these kinds, in the order they were added."""

@@ -28,7 +28,7 @@ from . import block_ldl
 from .cone_newton import SOFTNESS, newton, softened_motion
 from .cone_rows import relative_motion
 
-_SWEEPS = 400
+_SWEEPS = 200
 _REPEATS = 3
 _ANCHORS = 2
 
@@ -130,14 +130,13 @@ def _violated(tape, s, skip, velocity):
 
 
 @inner
-def _sweep(tape, s, skip, velocity, worlds):
+def _sweep(tape, s, skip, velocity, worlds, allowed):
     """Projected Gauss-Seidel on W in the worlds of the mask, from the guess rows; worlds that did not settle."""
     zero = splat(0.0)
     half = splat(0.5)
     moving = worlds
     for _ in range(_SWEEPS):
         change = zero
-        largest = splat(1e-300)
         at = tape[H_CONTACTS]
         k = tape[H_CONTACT_PRODUCTS] + 1
         for index in range(tape[at]):
@@ -181,13 +180,12 @@ def _sweep(tape, s, skip, velocity, worlds):
                 store(s, guess, n)
                 store(s, guess + 1, t)
                 store(s, guess + 2, u)
-                for value, old in ((n, n0), (t, t0), (u, u0)):
-                    moved = absolute(value - old)
+                # What a change of impulse moves is what counts, not the impulse, which may be shared freely.
+                for scale, value, old in ((w00, n, n0), (size, t, t0), (size, u, u0)):
+                    moved = scale * absolute(value - old)
                     change = select(moved > change, moved, change)
-                    extent = absolute(value)
-                    largest = select(extent > largest, extent, largest)
             k += 5 + 4 * tape[k + 4]
-        moving = moving & (change > splat(1e-12) * largest)
+        moving = moving & (change > allowed)
         if not any_lane(moving):
             break
     return moving
@@ -219,12 +217,12 @@ def _anchor(tape, s, skip):
 
 
 @inner
-def solve_contacts(tape, s, skip, velocity):
+def solve_contacts(tape, s, skip, velocity, allowed):
     """Solve the contact problem left by elimination.
 
     In: right rows hold b minus W times the present multipliers; guess rows the present multipliers. Out:
-    right rows hold the change of the multipliers, guess rows the new ones. Returns the worlds that did
-    not settle.
+    right rows hold the change of the multipliers, guess rows the new ones. Sweeps settle when they move
+    contacts by no more than ``allowed`` [m or m/s]. Returns the worlds that did not settle.
     """
     zero = splat(0.0)
     at = tape[H_CONTACTS]
@@ -252,7 +250,7 @@ def solve_contacts(tape, s, skip, velocity):
             if tape[H_DENSE] >= 0:
                 stuck = newton(tape, s, skip, velocity, bad)
             if any_lane(stuck):
-                stuck = _sweep(tape, s, skip, velocity, stuck)
+                stuck = _sweep(tape, s, skip, velocity, stuck, allowed)
     for index in range(tape[at]):
         contact = at + 1 + CONTACT * index
         if skip[tape[contact + 20]] == 0:

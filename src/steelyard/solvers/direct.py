@@ -63,6 +63,8 @@ from .cone import factorise_contacts, solve_contacts
 from .gather import clear_velocity_multipliers, gather
 
 _FREE_CHANGES = 10
+# Passes after which a world whose contacts do not settle is flagged instead of tried again.
+_RETRIES = 4
 
 
 @dataclass(frozen=True)
@@ -431,6 +433,10 @@ def solve_stage(tape, s, skip, velocity, dt, target):
     contacts = tape[tape[H_CONTACTS]]
     bad = zero >= zero
     stuck = zero > zero
+    lost = zero > zero
+    allowed = load(s, tape[H_TOLERANCE])
+    if velocity:
+        allowed = allowed / dt
     if contacts > 0:
         factorise_contacts(tape, s, skip)
     for turn in range(tape[H_PASSES]):
@@ -445,7 +451,11 @@ def solve_stage(tape, s, skip, velocity, dt, target):
             others = select(changed, zero, splat(1.0)) > splat(0.5)
             changed = changed | _tighten(tape, s, velocity, dt, others, single)
         # Letting a cable go may stretch another: a world whose set changed has not settled.
-        late = stuck | changed | _right_rows(tape, s, velocity, dt)
+        late = changed | _right_rows(tape, s, velocity, dt)
+        if turn < _RETRIES:
+            late = late | stuck
+        else:
+            lost = lost | stuck
         bad = (bad & (zero >= zero)) if turn == 0 and contacts > 0 else late
         if not any_lane(bad):
             break
@@ -457,7 +467,7 @@ def solve_stage(tape, s, skip, velocity, dt, target):
             _contact_rows(tape, s, skip, velocity)
         block_ldl.forward(tape, tape[H_FORWARD], s, skip)
         if contacts > 0:
-            stuck = solve_contacts(tape, s, skip, velocity) & bad
+            stuck = solve_contacts(tape, s, skip, velocity, allowed) & bad
         block_ldl.backward(tape, tape[H_BACKWARD], s, skip)
         _accept(tape, s, skip, velocity, bad)
         gather(tape, s, skip, velocity, target)
@@ -465,4 +475,5 @@ def solve_stage(tape, s, skip, velocity, dt, target):
             # Velocities are linear and nothing can go slack: one solve is exact.
             bad = stuck
             break
+    bad = bad | lost
     store(s, tape[H_UNSETTLED], select(bad, splat(1.0), load(s, tape[H_UNSETTLED])))
