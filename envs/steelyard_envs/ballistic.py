@@ -265,11 +265,11 @@ class BallisticEnv(TaskEnv):
 
     ## Rewards
     The sum of
-    - `reward_hit`: 10 for a hit;
-    - `reward_near`: when a shot ends, its closeness less that of the shot before it (0 for the
-      first). Closeness is 1 for a hit, else 1 / (1 + miss / (far / 12)) with the least distance to
-      the target's centre as miss and far as below: 5 m for artillery. An episode's sum is the
-      closeness of its last shot, so near misses on the way to a hit pay nothing;
+    - `reward_hit`: 5 for a hit;
+    - `reward_near`: 5 times, when a shot ends, its closeness less that of the shot before it (0 for
+      the first). Closeness is 1 for a hit, else 1 / (1 + miss / (far / 12)) with the least distance
+      to the target's centre as miss and far as below: 5 m for artillery. An episode's sum is that
+      of its last shot, so near misses on the way to a hit pay nothing;
     - `reward_shot`: -0.1 per shot;
     - `reward_time`: -0.25 per second.
 
@@ -284,7 +284,7 @@ class BallisticEnv(TaskEnv):
     |---|---|---|---|
     | 1 | 0.025 far (artillery: 1.5 m) | at rest | up to 10 m/s, observed |
     | 2 | 0.02 far (1.2 m) | runs | up to 20 m/s, observed |
-    | 3 | 0.015 far (0.9 m) | runs, and weaves 0.03 far to either side every 6 s | up to 20 m/s, hidden |
+    | 3 | 0.015 far (0.9 m) | runs, weaving 0.03 far to either side in 6 s | up to 20 m/s, hidden |
 
     ## Episode End
     Terminated when a shot hits the target (then `is_success`), when the last shot has ended without
@@ -309,7 +309,7 @@ class BallisticEnv(TaskEnv):
     dv/dt = a - c (v - wind) with c = -ln(damping): drag is linear in the velocity relative to the
     air, so the wind is a constant acceleration and flight has a closed form, which the default
     method takes. Greatest error of an artillery shot's place in 2.5 s of flight, against the closed
-    form from the muzzle, by `pytest tests/envs/test_ballistic.py -k measured_error -s`:
+    form from the muzzle, by `pytest tests/envs/test_ballistic_flight.py -k measured -s`:
 
     | `method` | `physics_rate` | Error |
     |---|---|---|

@@ -1,11 +1,11 @@
 """Flight of Ballistic's shot: where it meets a moving target, passes it, or comes down.
 
-The shot flies in closed form (``steelyard.flight``); the target's centre runs straight and may weave
-across its way: place + travel t + weave sin(angle + rate t). Every answer is a root on these closed
-forms, so nothing depends on where steps begin and end, and no shot is too fast for a target.
+The shot flies in closed form (``steelyard.flight``); the target's centre runs straight and may
+weave across its way: place + travel t + weave sin(angle + rate t). Every answer is a root on these
+closed forms, so nothing depends on where steps begin and end, and no shot is too fast for a target.
 
 Kernels take ``flight`` (ROWS, worlds), of which column ``w`` is one world's; the rate of the shot's
-drag c = -ln(damping) [1/s]; the rate of the weave [rad/s]; and times [s] from the start of the step.
+drag c = -ln(damping) [1/s]; the rate of the weave [rad/s]; times [s] from the start of the step.
 """
 
 from __future__ import annotations
@@ -79,8 +79,8 @@ def _sought(goal, flight, w, drag, rate, radius, time):
 def _root(goal, flight, w, drag, rate, radius, high):
     """Where in [0, high] ``_sought`` changes its sign, from the far side; ``high`` if it does not.
 
-    Regula falsi in the Illinois form (Dowell & Jarratt 1971) to the last bits of the time; every fourth
-    step halves the bracket, so that rounding near the root cannot stall it.
+    Regula falsi in the Illinois form (Dowell & Jarratt 1971) to the last bits of the time; every
+    fourth step halves the bracket, so that rounding near the root cannot stall it.
     """
     low, side = 0.0, 0
     at_low = _sought(goal, flight, w, drag, rate, radius, low)
@@ -111,8 +111,8 @@ def _root(goal, flight, w, drag, rate, radius, high):
 def _nearest(flight, w, drag, rate, end):
     """When in [0, end] the shot is nearest to the target's centre.
 
-    On the scale of a step the squared gap to a target within reach is convex, as speed^2 is far above
-    gap times acceleration; so it falls up to one least value and rises after it.
+    On the scale of a step the squared gap to a target within reach is convex, as speed^2 is far
+    above gap times acceleration; so it falls up to one least value and rises after it.
     """
     if _sought(_APPROACH, flight, w, drag, rate, 0.0, 0.0) >= 0.0:
         return 0.0
@@ -153,8 +153,8 @@ def follow_shot(flight, state, position, velocity, w, dt, drag, rate, radius, ag
     """Follow a shot through a step that the physics has made: to the target, the ground, or on.
 
     Its path is the flight that leaves the step's start with its velocity and ends where the physics
-    put it: with the exact method the flight itself, with others a path without gaps between steps. A
-    shot that ends is parked at the pivot, at rest.
+    put it: with the exact method the flight itself, with others a path without gaps between steps.
+    A shot that ends is parked at the pivot, at rest.
 
     Args:
         flight: see the module.

@@ -5,7 +5,7 @@ from gymnasium.envs.registration import register, registry
 # Id, module, class prefix, episode length [control steps], return that counts as solved.
 ENVIRONMENTS = (
     ("steelyard/Platform-v0", "platform", "Platform", 500, 425.0),
-    ("steelyard/Ballistic-v0", "ballistic", "Ballistic", 600, 2.5),
+    ("steelyard/Ballistic-v0", "ballistic", "Ballistic", 600, 8.5),
     ("steelyard/Bridge-v0", "bridge", "Bridge", 1000, 800.0),
 )
 

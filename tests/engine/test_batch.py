@@ -104,9 +104,7 @@ def balls() -> sy.Scene:
 def springs() -> sy.Scene:
     """Every force, with ground below."""
     scene = sy.Scene()
-    a, b, c = (
-        scene.add(sy.Particle(position=(k, 0.4 * k, 0.0), damping=0.95)) for k in range(3)
-    )
+    a, b, c = (scene.add(sy.Particle(position=(k, 0.4 * k, 0.0), damping=0.95)) for k in range(3))
     scene.add(sy.Spring(a, b, 200.0, 0.8))
     scene.add(sy.Bungee(b, c, 150.0, 1.0))
     scene.add(sy.AnchoredSpring(a, (0.0, 1.0, 0.0), 80.0, 0.5))

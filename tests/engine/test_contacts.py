@@ -1,4 +1,4 @@
-"""One contract for every solver that takes contacts: bounce, rest, slide, stick, roll off, recover."""
+"""Contacts with ground, one contract for every solver that takes them: bounce, rest, slide, stick."""
 
 from __future__ import annotations
 
@@ -53,13 +53,6 @@ def tetrahedron(*, lift: float = 0.0, **ground: float) -> sy.Scene:
         scene.add(sy.Rod(a, b))
     scene.add(sy.Ground(**ground))
     return scene
-
-
-def spheres(a: Array, b: Array, _: Array, reach: float = 0.2) -> tuple[Array, Array]:
-    """Contacts of pairs of spheres whose radii add up to ``reach`` [m]; negative while apart."""
-    apart = a - b
-    distance = np.linalg.norm(apart, axis=-1)
-    return apart / distance[..., None], reach - distance
 
 
 # Bouncing
@@ -295,134 +288,6 @@ def test_a_thrown_body_neither_enters_nor_gains(
         before = world.energy.copy()
     assert (world.energy < first - 1.0).all()
     assert (~settled).sum() <= (1 if friction else 0)
-
-
-# Line platforms
-
-
-@pytest.mark.parametrize("name", METHODS)
-def test_a_particle_rests_on_a_line_platform(name: str) -> None:
-    scene = sy.Scene()
-    scene.add(sy.Particle(position=(0.2, 0.5, 0.0), radius=0.1))
-    start, end = (-1.0, 0.0, 0.0), (1.0, 0.0, 0.0)
-    scene.add(sy.LinePlatform(start=start, end=end, radius=0.05, friction=0.3))
-    dt = 1 / 120
-    world = sy.World(scene, method=method(name, dt=dt))
-    world.step(240)
-    slack = 2.0 * G * dt**2 if name.startswith("Explicit") else 1e-12
-    np.testing.assert_allclose(world.particles.position[0, 0], [0.2, 0.15, 0.0], rtol=0, atol=slack)
-
-
-@pytest.mark.parametrize("name", METHODS)
-def test_a_particle_slides_off_the_round_end(name: str) -> None:
-    # Without friction a point on a round of radius R leaves it at cos a = 2/3 + v0^2 / (3 g R), and keeps
-    # its level speed from there.
-    radius, speed = 1.0, 1.0
-    cosine = 2.0 / 3.0 + speed**2 / (3.0 * G * radius)
-    level = math.sqrt(speed**2 + 2.0 * G * radius * (1.0 - cosine)) * cosine
-    scene = sy.Scene()
-    scene.add(sy.Particle(position=(-0.1, 1.0, 0.0), velocity=(speed, 0.0, 0.0), radius=0.4))
-    scene.add(sy.LinePlatform(start=(-2.0, 0.0, 0.0), end=(0.0, 0.0, 0.0), radius=0.6))
-    dt = 1 / 1600
-    world = sy.World(scene, method=method(name, dt=dt))
-    nearest = math.inf
-    for _ in range(240):
-        world.step(10)
-        x = world.particles.position[0, 0]
-        nearest = min(nearest, np.linalg.norm(x - [min(x[0], 0.0), 0.0, 0.0]))
-    # First order at best: the normal is that of the step's start.
-    assert world.particles.velocity[0, 0, 0] == pytest.approx(level, abs=5.0 * speed * dt)
-    # From the tangent plane of the step's start the round falls away: nothing can be nearer.
-    assert nearest > radius - 1e-9
-    assert world.particles.position[0, 0, 1] < -1.0
-
-
-@pytest.mark.parametrize("name", METHODS)
-def test_platforms_and_ground_touch_only_the_particles_named(name: str) -> None:
-    scene = sy.Scene()
-    a, b, c = (scene.add(sy.Particle(position=(x, 0.5, 0.0), radius=0.1)) for x in (-1.0, 0.0, 1.0))
-    ends = {"start": (-2.0, 0.0, 0.0), "end": (2.0, 0.0, 0.0)}
-    scene.add(sy.LinePlatform(**ends, particles=[a]))
-    scene.add(sy.Ground(height=-0.4, particles=[b]))
-    world = sy.World(scene, method=method(name, dt=1 / 120))
-    world.step(120)
-    falls = world.particles.position[0, [scene.particles.index(p) for p in (a, b, c)], 1]
-    np.testing.assert_allclose(falls[:2], [0.1, -0.3], rtol=0, atol=2.0 * G / 120**2)
-    assert falls[2] < -4.0
-
-
-# Contacts between particles
-
-
-def collision(name: str, restitution: float, friction: float = 0.0) -> tuple[Array, sy.World]:
-    """Two unequal spheres just after their collision, and the normal (3,) at the start of its step."""
-    scene = sy.Scene(gravity=(0.0, 0.0, 0.0))
-    a = scene.add(sy.Particle(position=(-0.5, 0.02, 0.0), velocity=(2.0, 0.0, 0.0), mass=1.0))
-    b = scene.add(sy.Particle(position=(0.5, 0.0, 0.0), velocity=(-1.0, 0.3, 0.1), mass=3.0))
-    scene.add(sy.ContactGenerator(spheres, [(a, b)], restitution=restitution, friction=friction))
-    world = sy.World(scene, method=method(name, dt=1 / 120))
-    before = world.particles.velocity[0].copy()
-    for _ in range(120):
-        apart = np.subtract(*world.particles.position[0])
-        world.step()
-        if np.abs(world.particles.velocity[0] - before).max() > 1e-6:
-            break
-    else:
-        raise AssertionError("the spheres pass through each other")
-    return apart / np.linalg.norm(apart), world
-
-
-@pytest.mark.parametrize("name", METHODS)
-@pytest.mark.parametrize("restitution", [0.0, 0.5, 1.0])
-def test_collision_law(name: str, restitution: float) -> None:
-    # v' = v - (1 + e) m_r (v_rel . n) n / m, along the normal at the step's start.
-    normal, world = collision(name, restitution)
-    a, b = np.array([2.0, 0.0, 0.0]), np.array([-1.0, 0.3, 0.1])
-    impulse = (1.0 + restitution) * 0.75 * ((a - b) @ normal) * normal
-    expected = np.array([a - impulse, b + impulse / 3.0])
-    np.testing.assert_allclose(world.particles.velocity[0], expected, rtol=0, atol=1e-12)
-
-
-@pytest.mark.parametrize("name", METHODS)
-@pytest.mark.parametrize("friction", [0.0, 0.3])
-def test_colliding_particles_push_each_other(name: str, friction: float) -> None:
-    _, world = collision(name, 0.5, friction)
-    np.testing.assert_allclose(world.momentum, [[-1.0, 0.9, 0.3]], rtol=0, atol=1e-12)
-    before = 0.5 * (4.0 + 3.0 * 1.1)
-    assert world.energy[0] < before
-
-
-@pytest.mark.parametrize("name", METHODS)
-def test_collision_friction_stays_within_its_cone(name: str) -> None:
-    change = []
-    for friction in (0.0, 0.05):
-        normal, world = collision(name, 0.5, friction)
-        gained = world.particles.velocity[0, 0] - [2.0, 0.0, 0.0]
-        along = gained @ normal
-        across = np.linalg.norm(gained - along * normal)
-        change.append((along, across))
-    assert change[0][1] == pytest.approx(0.0, abs=1e-9)
-    # The spheres still slip afterwards, so friction is mu times the normal impulse.
-    assert change[1][1] == pytest.approx(0.05 * abs(change[1][0]), rel=1e-6)
-
-
-@pytest.mark.parametrize("name", METHODS)
-def test_spheres_pile_up_without_entering(name: str) -> None:
-    scene = sy.Scene()
-    pile = [
-        scene.add(sy.Particle(position=(0.0, 0.1 + 0.25 * k, 0.0), radius=0.1)) for k in range(4)
-    ]
-    scene.add(sy.ContactGenerator(spheres, list(combinations(pile[::-1], 2))))
-    scene.add(sy.Ground(friction=0.5))
-    dt = 1 / 240
-    world = sy.World(scene, method=method(name, dt=dt))
-    world.step(480)
-    # A written contact is only seen once it is entered: by a step's fall, g dt^2, and by what those above
-    # push it down meanwhile, which the resolver's one way of pushing back makes worse.
-    entered = (4.0 if name in STAGED else 16.0) * G * dt**2
-    heights = world.particles.position[0, :, 1]
-    assert (np.diff(heights) >= 0.2 - entered).all()
-    np.testing.assert_allclose(heights, [0.1, 0.3, 0.5, 0.7], rtol=0, atol=4.0 * entered)
 
 
 def test_methods_without_contact_solver_refuse() -> None:

@@ -87,9 +87,7 @@ def test_many_sweeps_reach_the_dense_solution(scene: DenseScene, dt: float) -> N
     solver = sy.GaussSeidel(passes=60_000)
     world = sy.World(from_dense_scene(scene), method=sy.Method(sy.Rattle(), solver, dt=dt))
     world.step()
-    np.testing.assert_allclose(
-        world.particles.position[0], states[1].position, rtol=0, atol=1e-8
-    )
+    np.testing.assert_allclose(world.particles.position[0], states[1].position, rtol=0, atol=1e-8)
     np.testing.assert_allclose(
         world.particles.velocity[0], states[1].velocity, rtol=0, atol=1e-8 / dt
     )
@@ -106,9 +104,7 @@ def test_rods_run_backwards(scene: DenseScene, dt: float) -> None:
     world.particles.velocity[:] *= -1.0
     advance(world, 3)
     np.testing.assert_allclose(world.particles.position[0], scene.position, rtol=0, atol=1e-8)
-    np.testing.assert_allclose(
-        world.particles.velocity[0], -scene.velocity, rtol=0, atol=1e-8 / dt
-    )
+    np.testing.assert_allclose(world.particles.velocity[0], -scene.velocity, rtol=0, atol=1e-8 / dt)
 
 
 @pytest.mark.slow

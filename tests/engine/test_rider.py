@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -67,7 +68,7 @@ def test_a_moving_load_is_second_order() -> None:
         world = sy.World(scene, method=method("Rattle-Direct", dt=2.0 / steps))
         drive(world, rider, steps)
         positions.append(world.particles.position[0].copy())
-    change = [np.abs(a - b).max() for a, b in zip(positions, positions[1:], strict=False)]
+    change = [np.abs(a - b).max() for a, b in pairwise(positions)]
     np.testing.assert_allclose(np.divide(change[:-1], change[1:]), 4.0, rtol=0.02)
 
 

@@ -1,14 +1,19 @@
 """Every registered environment, and ways to play it whose outcomes compare bit for bit."""
 
+import functools
 import sys
 
 import gymnasium as gym
 import numpy as np
 from gymnasium.envs.registration import load_env_creator
+from gymnasium.utils.env_checker import data_equivalence
+from gymnasium.vector import AutoresetMode, SyncVectorEnv
 from numba.core.dispatcher import Dispatcher
 
 from steelyard_envs.registration import ENVIRONMENTS
 
+# Time limit of episodes where many of them are wanted [control steps].
+LIMIT = 40
 IDS = tuple(row[0] for row in ENVIRONMENTS)
 
 
@@ -67,3 +72,20 @@ def go_on(env, actions):
 def play(env, actions, *, seed):
     """Outcomes of a seeded reset and all that follows."""
     return [begin(env, seed=seed), *go_on(env, actions)]
+
+
+def native(env_id, rows, mode=AutoresetMode.NEXT_STEP, **kwargs):
+    kwargs = {"max_episode_steps": LIMIT} | kwargs
+    return gym.make_vec(
+        env_id, rows, vectorization_mode="vector_entry_point", autoreset_mode=mode, **kwargs
+    )
+
+
+def singles(env_id, rows, mode=AutoresetMode.NEXT_STEP, **kwargs):
+    make = functools.partial(gym.make, env_id, **{"max_episode_steps": LIMIT} | kwargs)
+    return SyncVectorEnv([make] * rows, autoreset_mode=mode)
+
+
+def assert_same(mine, its):
+    """Same types, shapes, keys and bits."""
+    assert data_equivalence(mine, its, exact=True), (mine, its)

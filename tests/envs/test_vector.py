@@ -1,35 +1,21 @@
 """Native vector environments against Gymnasium's vector environment of single ones, bit for bit."""
 
-import functools
-
 import gymnasium as gym
 import numpy as np
 import pytest
-from gymnasium.utils.env_checker import data_equivalence
-from gymnasium.vector import AutoresetMode, SyncVectorEnv
+from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
-from gymnasium.wrappers import vector as wrappers
 
-from tests.envs.environments import IDS, some_actions, specialisations, task_class
-
-LIMIT = 40
-
-
-def native(env_id, rows, mode=AutoresetMode.NEXT_STEP, **kwargs):
-    kwargs = {"max_episode_steps": LIMIT} | kwargs
-    return gym.make_vec(
-        env_id, rows, vectorization_mode="vector_entry_point", autoreset_mode=mode, **kwargs
-    )
-
-
-def singles(env_id, rows, mode=AutoresetMode.NEXT_STEP, **kwargs):
-    make = functools.partial(gym.make, env_id, **{"max_episode_steps": LIMIT} | kwargs)
-    return SyncVectorEnv([make] * rows, autoreset_mode=mode)
-
-
-def assert_same(mine, its):
-    """Same types, shapes, keys and bits."""
-    assert data_equivalence(mine, its, exact=True), (mine, its)
+from tests.envs.environments import (
+    IDS,
+    LIMIT,
+    assert_same,
+    native,
+    singles,
+    some_actions,
+    specialisations,
+    task_class,
+)
 
 
 def step_both(mine, its, action):
@@ -303,58 +289,6 @@ def test_inputs_of_any_layout_are_the_same_and_compile_nothing(env_id):
     ):
         assert_same(play(convert), wanted)
     assert specialisations() == before
-
-
-WRAPPERS = {
-    "RecordEpisodeStatistics": wrappers.RecordEpisodeStatistics,
-    "NormalizeObservation": wrappers.NormalizeObservation,
-    "NormalizeReward": wrappers.NormalizeReward,
-    "ClipReward": functools.partial(wrappers.ClipReward, min_reward=-0.1, max_reward=0.5),
-    "ClipAction": wrappers.ClipAction,
-    "RescaleAction": functools.partial(wrappers.RescaleAction, min_action=0.0, max_action=2.0),
-    "RescaleObservation": functools.partial(
-        wrappers.RescaleObservation, min_obs=np.float32(-1.0), max_obs=np.float32(1.0)
-    ),
-    "FlattenObservation": wrappers.FlattenObservation,
-    "DtypeObservation": functools.partial(wrappers.DtypeObservation, dtype=np.float64),
-    "DictInfoToList": wrappers.DictInfoToList,
-}
-
-
-# Gymnasium refuses to wrap environments that reset otherwise.
-NOT_SAME_STEP = {AutoresetMode.NEXT_STEP, AutoresetMode.DISABLED}
-ONLY = {
-    "NormalizeObservation": {AutoresetMode.NEXT_STEP},
-    "RescaleObservation": NOT_SAME_STEP,
-    "FlattenObservation": NOT_SAME_STEP,
-    "DtypeObservation": NOT_SAME_STEP,
-}
-WRAPPED = [
-    (name, mode) for name in WRAPPERS for mode in AutoresetMode if mode in ONLY.get(name, {mode})
-]
-
-
-@pytest.mark.filterwarnings("ignore:.*precision lowered.*:UserWarning")
-@pytest.mark.filterwarnings("ignore:overflow encountered in cast:RuntimeWarning")
-@pytest.mark.parametrize(("wrapper", "mode"), WRAPPED)
-@pytest.mark.parametrize("env_id", IDS)
-def test_gymnasiums_wrappers_work(env_id, mode, wrapper):
-    mine = WRAPPERS[wrapper](native(env_id, 5, mode))
-    its = WRAPPERS[wrapper](singles(env_id, 5, mode))
-    assert_same(mine.reset(seed=1), its.reset(seed=1))
-    statistics = 0
-    for action in some_actions(env_id, 3 * LIMIT, rows=5):
-        seen, wanted = mine.step(action), its.step(action)
-        if "episode" in seen[4]:
-            statistics += 1
-            assert (seen[4]["episode"].pop("t") >= 0.0).all()
-            wanted[4]["episode"].pop("t")
-        assert_same(seen, wanted)
-        ended = seen[2] | seen[3]
-        if mode is AutoresetMode.DISABLED and ended.any():
-            begun = [env.reset(options={"reset_mask": ended.copy()}) for env in (mine, its)]
-            assert_same(*begun)
-    assert (statistics >= 2) == (wrapper == "RecordEpisodeStatistics")
 
 
 @pytest.mark.parametrize("env_id", IDS)

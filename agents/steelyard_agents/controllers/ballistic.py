@@ -18,10 +18,10 @@ class BallisticController:
     """Fires along the low solution of the flight with drag, wind and lead.
 
     With linear drag c, wind w and own acceleration a the shot's displacement in a time T is
-    V phi1(T) + (a + c w) phi2(T), with phi1 = (1 - e^(-cT))/c and phi2 = (T - phi1)/c. The length of
-    the muzzle velocity V is given, so T solves |target(T) - muzzle - (a + c w) phi2(T)| = |V| phi1(T):
-    Newton's method from the time of a straight shot. Where the wind is hidden, it is what bent the
-    last shot.
+    V phi1(T) + (a + c w) phi2(T), with phi1 = (1 - e^(-cT))/c and phi2 = (T - phi1)/c. The muzzle
+    velocity V has a given length, so T solves |target(T) - muzzle - (a + c w) phi2(T)| = |V| phi1(T):
+    Newton's method, from the time of a straight shot. Where the wind is hidden, it is what bends the
+    shot in flight.
 
     Args:
         shot: Kind of shot, as in the environment.

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -133,20 +133,6 @@ def flight_fall_time(height, velocity, acceleration, rate):
     return math.inf if extreme > 0.0 else _newton(height, velocity, acceleration, rate, 0.0)
 
 
-def _points(name: str, value: Any) -> np.ndarray:
-    """``value`` as finite points, shape (..., 3)."""
-    try:
-        points = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError):
-        points = np.empty(0)
-    if points.shape[-1:] != (3,) or not np.isfinite(points).all():
-        raise ValueError(
-            f"flight_impact: {name} is {value!r}; it must be finite, of shape (..., 3). "
-            "Give x, y, z of every particle."
-        )
-    return points
-
-
 def flight_impact(
     position: np.ndarray,
     velocity: np.ndarray,
@@ -168,7 +154,8 @@ def flight_impact(
         Times (...) [s], inf where it never falls through, and places (..., 3) [m], NaN there.
 
     Raises:
-        ValueError: damping out of range, or a value that is not finite or of another shape.
+        ValueError: a setting out of range, or positions and velocities of unfit shapes. A particle
+            that is not finite has NaN for an answer.
     """
     owner = "flight_impact"
     pull = checks.vector(owner, "acceleration", acceleration)
@@ -176,9 +163,17 @@ def flight_impact(
         owner, "damping", damping, above=0.0, most=1.0, remedy="Use 1 for no damping."
     )
     level = checks.number(owner, "height", height, remedy="Give the level in metres.")
-    x = _points("position", position)
-    v = _points("velocity", velocity)
-    shape = np.broadcast_shapes(x.shape, v.shape)
+    x, v = checks.floats(position), checks.floats(velocity)
+    try:
+        shape = () if x is None or v is None else np.broadcast_shapes(x.shape, v.shape)
+    except ValueError:
+        shape = ()
+    if x is None or v is None or not shape[-1:] == x.shape[-1:] == v.shape[-1:] == (3,):
+        raise ValueError(
+            f"flight_impact: position is {checks.described(position)} and velocity "
+            f"{checks.described(velocity)}; both must be of shapes (..., 3) that broadcast. "
+            "Give x, y, z of every particle."
+        )
     points = np.broadcast_to(x, shape).reshape(-1, 3)
     speeds = np.broadcast_to(v, shape).reshape(-1, 3)
     rate = -math.log(share)
