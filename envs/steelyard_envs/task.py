@@ -155,16 +155,18 @@ class Task(ABC):
 
     def snapshot(self) -> tuple[Any, ...]:
         """Copy of the whole state: physics, task, random streams and outputs."""
-        arrays = (self.values, self.streams, self.rewards, self.flags, self.observations)
-        return self.world.snapshot(), tuple(array.copy() for array in arrays)
+        return self.world.snapshot(), tuple(array.copy() for array in self._arrays())
 
     def restore(self, snapshot: tuple[Any, ...]) -> None:
         """Put back a snapshot of this task."""
         world, copies = snapshot
         self.world.restore(world)
-        arrays = (self.values, self.streams, self.rewards, self.flags, self.observations)
-        for array, copy in zip(arrays, copies, strict=True):
+        for array, copy in zip(self._arrays(), copies, strict=True):
             array[:] = copy
+
+    def _arrays(self) -> tuple[Array, ...]:
+        """Everything but the physics that a snapshot keeps."""
+        return (self.values, self.streams, self.rewards, self.flags, self.observations)
 
     @property
     def action_shape(self) -> tuple[int]:
