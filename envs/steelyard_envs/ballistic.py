@@ -329,7 +329,8 @@ class BallisticEnv(TaskEnv):
 
     | Policy | Return | Success |
     |---|---|---|
-    BASE
+    | random | -1.3 | 2 % |
+    | hand-written | 9.5 | 100 % |
 
     ## Version History
     - v0: first version.
