@@ -192,9 +192,9 @@ class BallisticTask(Task):
             pull = (drag * wind[0], self.shot.acceleration, drag * wind[1])
             particles = self.world.particles
             place, velocity = particles.position[index, 0], particles.velocity[index, 0]
-            draw_shot(drawing, place, velocity, pull, drag, since, 0.25 * radius)
+            draw_shot(drawing, place, velocity, pull, drag, since, 0.35 * radius)
         elif hit or miss > 0.0:
-            draw_mark(drawing, flight[MARK : MARK + 3], hit=hit)
+            draw_mark(drawing, flight[MARK : MARK + 3], radius, hit=hit)
         drawing.text("time", value=f"{values[kernels.ELAPSED] * dt:.2f} s")
         drawing.text("shots left", value=f"{values[kernels.LEFT]:.0f} of {SHOTS}")
         drawing.text("reload", value=f"{max(RELOAD - since, 0.0):.1f} s")

@@ -94,8 +94,6 @@ def _root(goal, flight, w, drag, rate, radius, high):
         if k % 4 == 3 or not low < time < high:
             time = 0.5 * (low + high)
         at_time = _sought(goal, flight, w, drag, rate, radius, time)
-        if at_time == 0.0:
-            return time
         if (at_time > 0.0) == (at_high > 0.0):
             high, at_high = time, at_time
             at_low *= 0.5 if side == 1 else 1.0

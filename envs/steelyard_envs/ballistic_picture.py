@@ -95,11 +95,11 @@ def draw_shot(
     drawing.circle(place, radius, color=_palette.SHOT)
 
 
-def draw_mark(drawing: sy.draw.Drawing, place: Vector, *, hit: bool) -> None:
-    """Where the last shot ended: a burst on the target, or a stake in the ground."""
+def draw_mark(drawing: sy.draw.Drawing, place: Vector, radius: float, *, hit: bool) -> None:
+    """Where the last shot ended: a burst on the target of that radius, or a stake in the ground."""
     if hit:
-        for radius, alpha in ((3.0, 70), (2.0, 130), (1.0, 230)):
-            drawing.circle(place, radius, color=(*_palette.LOAD, alpha))
+        for size, alpha in ((2.4, 70), (1.6, 130), (0.8, 230)):
+            drawing.circle(place, size * radius, color=(*_palette.LOAD, alpha))
     elif place[1] < 0.1:
         x, y, z = place
         drawing.circle((x, 0.03, z), 1.2, color=(*_palette.SHOT, 120), normal=(0, 1, 0), layer=-1)

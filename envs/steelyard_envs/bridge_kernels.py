@@ -249,7 +249,7 @@ def slides(values, layout, state, w):
 @sy.kernel
 def _clip(value, low, high):
     """``value`` within bounds, 0 if it is not a number."""
-    return min(max(value, low), high) if value == value else 0.0
+    return min(max(value if value == value else 0.0, low), high)
 
 
 @sy.kernel

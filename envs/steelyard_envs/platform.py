@@ -126,7 +126,7 @@ def _control(actions, values, streams, settings, layout, state):
 @sy.kernel
 def _clip(value, low, high):
     """``value`` within bounds, 0 if it is not a number."""
-    return min(max(value, low), high) if value == value else 0.0
+    return min(max(value if value == value else 0.0, low), high)
 
 
 @sy.kernel
@@ -368,12 +368,22 @@ class PlatformEnv(TaskEnv):
 
     ## Physics
     One step of dt = 0.02 s per control step by default. The load is a particle held at its place on the
-    deck with its full inertia, not a mass spread over the corners. Measured errors stand in
-    `docs/environments.md` with the command that measured them.
+    deck with its full inertia, not a mass spread over the corners. Largest distance of any particle from
+    `"rattle"` at 1600 Hz after 1 s of random actions at difficulty 1, median over 32 worlds:
+
+    | method | 50 Hz | 100 Hz | 200 Hz |
+    |---|---|---|---|
+    | `"rattle"` | 1.5e-4 m | 3.9e-5 m | 9.8e-6 m |
+    | `"symplectic_euler"` | 4.4e-3 m | 2.2e-3 m | 1.1e-3 m |
+    | `"gauss_seidel"` | 4.8e-3 m | 2.4e-3 m | 1.1e-3 m |
+
+    Command: `python -m benchmarks.environment_error steelyard/Platform-v0 --rates 50 100 200 --reference 1600
+    --seconds 1 --rows 32 --difficulty 1`.
 
     ## Baselines
-    `steelyard_agents.controllers` holds a linear-quadratic regulator for this environment, and
-    `agents/results` the scores of random actions, of that controller and of PPO.
+    Difficulty 2, 100 episodes from seed 1000000: random actions return 56 and never succeed; the
+    linear-quadratic regulator of `steelyard_agents.controllers` returns 405 and succeeds in 100. Command:
+    `python -m steelyard_agents.evaluate controller --env steelyard/Platform-v0 --episodes 100`.
 
     ## Version History
     - v0: first version.
