@@ -358,7 +358,7 @@ def test_the_load_slides_off_a_steep_deck():
     env.reset(seed=0)
     still(env)
     action = np.array([[1.0, -1.0, -1.0, 0.0, 0.0, 0.0]], np.float32)
-    for step in range(500):
+    for step in range(500):  # noqa: B007
         observation, _, terminated, _, info = env.step(action)
         slope = -float(observation[0, 35])
         if terminated[0]:
