@@ -74,6 +74,7 @@ def test_set_mass_equals_a_scene_built_with_the_mass() -> None:
     built, _ = mujoco_scenes.build(bridge(mass=mass), dt=0.01)
     np.testing.assert_array_equal(moved.body_mass, built.body_mass)
     np.testing.assert_allclose(moved.dof_damping, built.dof_damping, rtol=1e-15)
+    np.testing.assert_allclose(moved.dof_M0, built.dof_M0, rtol=1e-15)
 
 
 def test_ground_holds_a_particle_that_slides_until_friction_stops_it() -> None:

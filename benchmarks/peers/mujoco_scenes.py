@@ -119,9 +119,11 @@ def velocities(data: mujoco.MjData) -> Array:
 def set_mass(model: mujoco.MjModel, scene: ParticleScene, mass: Array) -> None:
     """Give the particles new masses [kg], shape (particles,): a load that moves over a deck.
 
-    The damping of a joint is a force per velocity, so it is scaled with the mass.
+    The damping of a joint is a force per velocity, so it is scaled with the mass. MuJoCo reads the inertia of
+    bodies that only slide from ``dof_M0``, not from their mass.
     """
     model.body_mass[1:] = mass
+    model.dof_M0[:] = np.repeat(mass, 3)
     model.dof_damping[:] = np.repeat(_joint_damping(scene, mass), 3)
 
 
