@@ -187,9 +187,13 @@ def memory(name: str) -> list[Figure]:
 
 
 def needed_rows(scene: ParticleScene) -> int:
-    """Numbers that a world must keep: positions, velocities, tensions, time and two flags."""
-    links = len(scene.rods) + len(scene.cables) + len(scene.supports)
-    return 6 * len(scene.mass) + links + 3
+    """Numbers that a world must keep: positions, velocities, tensions, time and two flags.
+
+    Where all particles are joined to all others they are one frame, whose rods need no tensions.
+    """
+    count = len(scene.mass)
+    rods = 0 if 2 * len(scene.rods) == count * (count - 1) else len(scene.rods)
+    return 6 * count + rods + len(scene.cables) + len(scene.supports) + 3
 
 
 def _allocated(scene: sy.Scene, method: sy.Method, worlds: int) -> int:

@@ -34,7 +34,7 @@ def source_stamp(function: Callable[..., Any]) -> tuple[str, str]:
     return _digest(_PACKAGE), _digest(Path(function.__code__.co_filename).resolve().parent)
 
 
-def _compile(function: Callable[..., Any], **options: bool) -> Any:
+def _compile(function: Callable[..., Any], **options: bool | str) -> Any:
     settings: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy", **options}
     dispatcher: Any = numba.njit(**settings)(function)
     store: Any = getattr(dispatcher, "_cache", None)  # absent when NUMBA_DISABLE_JIT is set
@@ -60,3 +60,12 @@ def kernel(function: Callable[..., Any]) -> Any:
 def inner(function: Callable[..., Any]) -> Any:
     """A kernel that only kernels call: the same, less the wrapper for Python, which takes long to compile."""
     return _compile(function, no_cpython_wrapper=True, no_cfunc_wrapper=True)
+
+
+def part(function: Callable[..., Any]) -> Any:
+    """An inner kernel that is copied into its one caller before either is compiled.
+
+    LLVM optimises a kernel together with all that it calls, once for each level of a call tree. The few levels
+    that hold nearly everything would each cost as much again.
+    """
+    return _compile(function, no_cpython_wrapper=True, no_cfunc_wrapper=True, inline="always")

@@ -13,6 +13,7 @@ from .model.compile import PARTICLES, Model
 from .model.parameters import Key
 from .scene import checks
 from .scene.particle import Particle
+from .stepping import PICKED
 
 if TYPE_CHECKING:
     from .world import World
@@ -58,7 +59,7 @@ def new_scratch(model: Model) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.nd
     contacts = max(model.contacts_most, 1)
     return (
         aligned((model.rows, LANES)),
-        np.zeros(max(model.blocks, 1), dtype=np.int64),
+        np.zeros(model.blocks + PICKED, dtype=np.int64),
         np.zeros(contacts, dtype=np.int64),
         np.zeros((contacts, 12)),
     )

@@ -394,6 +394,6 @@ class World:
         ]
         if self.model.dropped:
             lines.append(
-                f"  {len(self.model.dropped)} rods implied by the others have no row of their own"
+                f"  {len(self.model.dropped)} rods implied by others or by a rigid cluster have no row"
             )
         return "\n".join(lines)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from ..kernel import inner
 from ..math.lanes import any_lane, fma, load, select, splat, sqrt, store
-from ..model.tape import CONTACT, GROUND, H_CONTACTS
+from ..model.tape import CONTACT, GROUND, H_CONTACTS, H_TOLERANCE
 
 # Share of a penetration found at the start that one step takes back.
 _RECOVERY = 0.2
@@ -66,7 +66,7 @@ def contact_targets(tape, s, dt, skip):
         reach = dt * (sqrt(square) + dt * sqrt(weight))
         near = gap < splat(4.0) * reach
         carried = load(s, tape[contact + 15]) > zero
-        low = gap < splat(-1e-9)
+        low = gap < splat(-10.0) * load(s, tape[H_TOLERANCE]) - splat(1e-9)
         leaves = low & (speed * dt > splat(-_RECOVERY) * gap)
         near = (near | carried) & (select(leaves, one, zero) < splat(0.5))
         # An impact this step: closing, and the surface lies within what speed and acceleration cover.

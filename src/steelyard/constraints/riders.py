@@ -1,16 +1,18 @@
 """Riders: a particle held at the weighted mean of others, x = sum of w_i x_i, three rows each.
 
 Record on the tape: x, v, impulse, multipliers, slot, inverse mass, count of deck particles, weights, rates, work
-rows (coefficients, then velocity multipliers), accelerations, then per deck particle: x, v, impulse, inverse mass.
+rows (coefficients, then velocity multipliers), then per deck particle: x, v, impulse, inverse mass. Riders on a
+rigid cluster (``clusters``) have no rows and no record here. How the weights move stands apart, for all of them:
+count, weights, rates, accelerations, coefficients.
 """
 
 from __future__ import annotations
 
 from ..kernel import inner
 from ..math.lanes import fma, load, splat, store
-from ..model.tape import H_RIDERS
+from ..model.tape import H_MOVERS, H_RIDERS
 
-HEAD = 11
+HEAD = 10
 DECK = 4
 
 
@@ -43,27 +45,25 @@ def rider_slip(s, tape, rider, component):
 @inner
 def rider_coefficients(tape, s):
     """Keep minus the present weights, the deck's coefficients: they direct the impulses."""
-    at = tape[H_RIDERS] + 1
-    for _ in range(tape[tape[H_RIDERS]]):
-        count = tape[at + 6]
-        for k in range(count):
-            store(s, tape[at + 9] + k, splat(0.0) - load(s, tape[at + 7] + k))
-        at += HEAD + DECK * count
+    at = tape[H_MOVERS]
+    for index in range(tape[at]):
+        mover = at + 1 + 5 * index
+        for k in range(tape[mover]):
+            store(s, tape[mover + 4] + k, splat(0.0) - load(s, tape[mover + 1] + k))
 
 
 @inner
 def rider_advance(tape, s, dt):
     """Move the weights over ``dt`` at constant acceleration."""
-    at = tape[H_RIDERS] + 1
-    for _ in range(tape[tape[H_RIDERS]]):
-        count = tape[at + 6]
-        for k in range(count):
-            rate = load(s, tape[at + 8] + k)
-            gain = dt * load(s, tape[at + 10] + k)
+    at = tape[H_MOVERS]
+    for index in range(tape[at]):
+        mover = at + 1 + 5 * index
+        for k in range(tape[mover]):
+            rate = load(s, tape[mover + 2] + k)
+            gain = dt * load(s, tape[mover + 3] + k)
             mean = fma(splat(0.5), gain, rate)
-            store(s, tape[at + 7] + k, fma(dt, mean, load(s, tape[at + 7] + k)))
-            store(s, tape[at + 8] + k, rate + gain)
-        at += HEAD + DECK * count
+            store(s, tape[mover + 1] + k, fma(dt, mean, load(s, tape[mover + 1] + k)))
+            store(s, tape[mover + 2] + k, rate + gain)
 
 
 @inner

@@ -89,6 +89,34 @@ def store(typing_context: Any, rows: Any, row: Any, value: Any) -> Any:
     return types.void(rows, types.int64, lane), codegen
 
 
+def _place(context: Any, builder: Any, array_type: Any, array: Any, row: Any, column: Any) -> Any:
+    view = context.make_array(array_type)(context, builder, array)
+    width = cgutils.unpack_tuple(builder, view.shape)[1]
+    start = builder.gep(view.data, [builder.add(builder.mul(row, width), column)])
+    return builder.bitcast(start, _DOUBLES.as_pointer())
+
+
+@_operation
+def load_at(typing_context: Any, rows: Any, row: Any, column: Any) -> Any:
+    """Lane vector from ``LANES`` neighbouring columns of a C-contiguous array of any width."""
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return builder.load(_place(context, builder, sig.args[0], *args), align=8)
+
+    return lane(rows, types.int64, types.int64), codegen
+
+
+@_operation
+def store_at(typing_context: Any, rows: Any, row: Any, column: Any, value: Any) -> Any:
+    """Write a lane vector to ``LANES`` neighbouring columns."""
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        builder.store(args[3], _place(context, builder, sig.args[0], *args[:3]), align=8)
+        return context.get_dummy_value()
+
+    return types.void(rows, types.int64, types.int64, lane), codegen
+
+
 @_operation
 def splat(typing_context: Any, value: Any) -> Any:
     """The same scalar in every lane."""

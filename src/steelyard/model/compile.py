@@ -91,10 +91,16 @@ class Compiler:
         self.counts: dict[str, int] = {}
         self.widths = {
             "springs": 7, "gravities": 3, "buoyancies": 5, "drags": 7, "stiff_springs": 8, "drift": 1,
-            "winches": 3, "links": LINK, "contacts": CONTACT, "generators": 2,
+            "winches": 3, "movers": 5, "links": LINK, "contacts": CONTACT, "generators": 2,
         }  # fmt: skip
         self.next_row = 0
         self.start: list[float] = []
+        direct = method.solver is not None and method.solver.code == tape.DIRECT
+        self.network = Network(self) if direct else None
+        if self.network is not None:
+            self.links = self.network.choose()
+        chosen = set(map(id, self.links))
+        self.implied = [link for link in scene.of(*LINKS) if id(link) not in chosen]
 
     # Rows
 
@@ -194,7 +200,7 @@ class Compiler:
                 self.state((link, "length"), [link.max_length])
                 self.state((link, "rate"), [0.0])
                 self.state((link, "acceleration"), [0.0])
-        for rider in self.riders:
+        for rider in self.scene.of(Rider):
             self.state((rider, "weights"), rider.weights)
             self.state((rider, "rates"), np.zeros(len(rider.deck)))
             self.state((rider, "accelerations"), np.zeros(len(rider.deck)))
@@ -390,7 +396,7 @@ class Compiler:
     def _links(self) -> None:
         """Work rows of constrained particles and a record per link."""
         count = len(self.particles)
-        constrained = bool(self.links or self.riders or self.contacts)
+        constrained = bool(self.links or self.implied or self.scene.of(Rider) or self.contacts)
         self.header["constrained"] = int(constrained)
         staged = constrained and self.method.solver is not None and self.method.solver.staged
         for name in ("start", "free"):
@@ -433,21 +439,31 @@ class Compiler:
                 self.header["inverse_mass"] + self.of(a), b[3], length_row, rate_row, int(cable), restitution,
                 self.place(link, "multiplier") if staged else -1, work, work + 3, -1, gain_row,
             ]  # fmt: skip
+        for rod in self.implied:
+            self.parameters.declare((rod, "length"), rod.length)
+            if isinstance(rod, RodConstraint):
+                self.parameters.declare((rod, "anchor"), rod.anchor)
         self.sections["links"] = records
         self.sections["winches"] = winches
         self.header["cables"] = sum(map(self.is_cable, self.links))
 
     def _riders(self) -> None:
-        """A record per rider."""
+        """How weights move, of every rider; and a record per rider with rows of its own."""
+        self.held = {id(rider): self.take(len(rider.deck) + 6) for rider in self.scene.of(Rider)}
+        movers: list[int] = []
+        for rider in self.scene.of(Rider):
+            movers += [
+                len(rider.deck), self.place(rider, "weights"), self.place(rider, "rates"),
+                self.place(rider, "accelerations"), self.held[id(rider)],
+            ]  # fmt: skip
+        self.sections["movers"] = movers
         records: list[int] = []
         for rider in self.riders:
-            held = self.take(len(rider.deck) + 6)
             load = rider.particle
             records += [
                 self.at("position", load), self.at("velocity", load), self.at("impulse", load),
                 self.place(rider, "multiplier"), -1, self.header["inverse_mass"] + self.of(load),
-                len(rider.deck), self.place(rider, "weights"), self.place(rider, "rates"), held,
-                self.place(rider, "accelerations"),
+                len(rider.deck), self.place(rider, "weights"), self.place(rider, "rates"), self.held[id(rider)],
             ]  # fmt: skip
             for p in rider.deck:
                 records += [
@@ -554,8 +570,9 @@ class Compiler:
 
     def _network(self) -> None:
         """Sparse matrix of the direct solver."""
-        if self.header["solver"] == tape.DIRECT and self.header["constrained"]:
-            Network(self).build()
+        if self.network is not None and self.header["constrained"]:
+            self.network.build()
+        self.header["given_up"] = self.take(1)
 
     def _write(self) -> None:
         """The tape: header, then every section with its count in front."""

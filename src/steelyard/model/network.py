@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..scene.links import RodConstraint
 from . import sparsity
+from .clusters import Clusters
 from .tape import CONTACT, LINK
 
 if TYPE_CHECKING:
@@ -32,7 +34,7 @@ class Network:
     def __init__(self, compiler: Compiler) -> None:
         self.c = compiler
         self.link_blocks: list[list[int]] = []
-        self.masks: dict[int, int] = {}
+        self.clusters = Clusters(compiler)
 
     def build(self) -> None:
         """Fill the compiler's sections of the direct solver."""
@@ -57,44 +59,56 @@ class Network:
             if p is not None and p.movable
         ]
 
-    def _kept(self) -> list[int]:
-        """Links with a row of their own: cables, and rods that others do not imply."""
+    def choose(self) -> list[Any]:
+        """Links with a row of their own: cables, and rods that others or a rigid cluster do not imply.
+
+        Riders that a cluster carries are taken from the compiler's list.
+        """
         c = self.c
-        count = len(c.particles)
         points = [p.position for p in c.particles]
-        masses = [p.inverse_mass for p in c.particles]
-        rods: list[int] = []
+        masses = [float(p.inverse_mass or 0.0) for p in c.particles]
+        rods: list[Any] = []
         pairs: list[tuple[int, int]] = []
-        kept: list[int] = []
-        for index, link in enumerate(c.links):
+        for link in c.links:
             if c.is_cable(link):
-                kept.append(index)
-            elif self._ends(index):
-                other = getattr(link, "b", None)
-                if other is None:
-                    points.append(link.anchor)
-                    masses.append(0.0)
-                    pair = (c.of(link.particle), len(points) - 1)
-                else:
-                    pair = (c.of(link.a), c.of(other))
-                rods.append(index)
+                continue
+            if isinstance(link, RodConstraint):
+                pair = (c.of(link.particle), len(points))
+                points.append(link.anchor)
+                masses.append(0.0)
+            else:
+                pair = (c.of(link.a), c.of(link.b))
+            if masses[pair[0]] + masses[pair[1]] > 0.0:
+                rods.append(link)
                 pairs.append(pair)
-        independent = sparsity.independent_rods(np.array(points), pairs, np.array(masses))
-        kept += [rods[k] for k in independent]
-        c.model.dropped = [c.links[rod] for k, rod in enumerate(rods) if k not in set(independent)]
-        assert len(points) >= count
-        return sorted(kept)
+        inside = self.clusters.find(rods, pairs)
+        independent = sparsity.independent_rods(
+            np.array(points), pairs, np.array(masses), first=inside
+        )
+        own = {id(rods[k]) for k in set(independent) - set(inside)}
+        carried = {id(rider) for riders in self.clusters.riders for rider in riders}
+        c.riders = [rider for rider in c.riders if id(rider) not in carried]
+        c.model.dropped = [rod for rod in rods if id(rod) not in own]
+        return [link for link in c.links if c.is_cable(link) or id(link) in own]
+
+    def _node(self, p: int) -> int:
+        """Blocks that share a node couple: a particle is one, or its whole cluster."""
+        of = self.clusters.of
+        return -1 - of[p] if p in of else p
 
     def _blocks(self) -> None:
         """Group links, number blocks and settle the elimination order; contacts come last."""
         c = self.c
-        kept = self._kept()
-        ends = [frozenset(p for p, _, _ in self._ends(link)) for link in kept]
-        self.link_blocks = [[kept[k] for k in block] for block in sparsity.group(ends)]
+        self.clusters.build()
+        ends = [
+            frozenset(self._node(p) for p, _, _ in self._ends(link)) for link in range(len(c.links))
+        ]
+        self.link_blocks = sparsity.group(ends)
         nodes = [
-            frozenset(p for link in block for p, _, _ in self._ends(link))
+            frozenset(self._node(p) for link in block for p, _, _ in self._ends(link))
             for block in self.link_blocks
         ]
+        #: Particles of riders' and contacts' blocks: (index, row of the coefficient, row of the inverse mass).
         self.points: dict[int, list[Node]] = {}
         self.frames: dict[int, int] = {}
         identity = c.slot(9, (), lambda: np.eye(3).ravel()) if c.riders else -1
@@ -109,8 +123,8 @@ class Network:
             )
             self.frames[block] = identity
             records[at + 4] = 3 * block
-            nodes.append(frozenset(p for p, _, _ in self.points[block]))
-            at += 11 + 4 * len(deck)
+            nodes.append(frozenset(self._node(p) for p, _, _ in self.points[block]))
+            at += 10 + 4 * len(deck)
         self.structural = len(nodes)
         for k, (_, a, b, _) in enumerate(c.contacts):
             block = len(nodes)
@@ -120,7 +134,7 @@ class Network:
             self.frames[block] = record[CONTACT * k + 16]
             record[CONTACT * k + 19] = 3 * block
             record[CONTACT * k + 20] = block
-            nodes.append(frozenset(p for p, _, _ in self.points[block]))
+            nodes.append(frozenset(self._node(p) for p, _, _ in self.points[block]))
         self.count = len(nodes)
         adjacency = sparsity.neighbours(nodes)
         links = len(self.link_blocks)
@@ -171,9 +185,13 @@ class Network:
             for row, link in enumerate(members):
                 record = c.sections["links"][LINK * link : LINK * link + LINK]
                 target = self.diagonal[self.place[block]] + _DIAGONAL[row]
-                diagonals += [target, record[13], record[6], record[7]]
-                for p, _, sign in self._ends(link):
+                masses = [c.zero, c.zero]
+                for p, mass, sign in self._ends(link):
+                    if p in self.clusters.of:
+                        continue
+                    masses[0 if sign > 0 else 1] = mass
                     touching.setdefault(p, []).append((3 * block + row, record[13], sign))
+                diagonals += [target, record[13], *masses]
         for p, around in touching.items():
             mass = c.header["inverse_mass"] + p
             for k, (slot, d, sign) in enumerate(around):
@@ -187,6 +205,8 @@ class Network:
         for block, nodes in self.points.items():
             row = self.place[block]
             for p, coefficient, mass in nodes:
+                if p in self.clusters.of:
+                    continue
                 point_diagonals += [self.diagonal[row], coefficient, mass]
                 for slot, d, sign in touching.get(p, []):
                     target = self.a[row, self.place[slot // 3]] + slot % 3
@@ -207,8 +227,58 @@ class Network:
         c.sections["point_points"] = point_points
         c.widths |= {
             "link_diagonals": 4, "link_couplings": 5, "point_diagonals": 3, "point_links": 6,
-            "point_points": 6, "link_masks": 3, "padding": 2, "references": 2, "contact_copies": 5,
+            "point_points": 6, "wrench_products": 6, "link_masks": 3, "padding": 2, "references": 2,
+            "contact_copies": 5,
         }  # fmt: skip
+        self._wrenches()
+
+    def _wrenches(self) -> None:
+        """What each block does to each cluster it touches, and the couplings that follow.
+
+        Record of a wrench: forces and moments of the block's three rows (18 rows), the motion they cause (18 rows),
+        inverse mass, inverse inertia, block, frame or -1; with a frame then a count of (coefficient, arm), without
+        a count of (row of the block, gradient, sign, arm).
+        """
+        c = self.c
+        clusters = self.clusters
+        ends: dict[tuple[int, int], list[list[int]]] = {}
+        for block, members in enumerate(self.link_blocks):
+            for row, link in enumerate(members):
+                d = c.sections["links"][LINK * link + 13]
+                for p, _, sign in self._ends(link):
+                    if p in clusters.of:
+                        cluster = clusters.of[p]
+                        # A link's impulse is minus its multiplier times the gradient.
+                        one = c.minus_one if sign > 0 else c.one
+                        ends.setdefault((block, cluster), []).append(
+                            [row, d, one, clusters.arms[p]]
+                        )
+        for block, nodes in self.points.items():
+            for p, coefficient, _ in nodes:
+                if p in clusters.of:
+                    ends.setdefault((block, clusters.of[p]), []).append(
+                        [coefficient, clusters.arms[p]]
+                    )
+        records: list[int] = []
+        rows: dict[tuple[int, int], int] = {}
+        for (block, cluster), entries in ends.items():
+            rows[block, cluster] = c.take(36)
+            wrench = rows[block, cluster]
+            frame = self.frames.get(block, -1)
+            records += [wrench, *clusters.inverses[cluster], block, frame, len(entries)]
+            for entry in entries:
+                records += entry
+        products: list[int] = []
+        for (block, cluster), wrench in rows.items():
+            i = self.place[block]
+            for (other, same), motion in rows.items():
+                j = self.place[other]
+                if same == cluster and j <= i:
+                    target = self.diagonal[i] if i == j else self.a[i, j]
+                    products += [target, int(i == j), wrench, motion + 18, block, other]
+        c.sections["wrenches"] = records
+        c.counts["wrenches"] = len(ends)
+        c.sections["wrench_products"] = products
 
     def _entry(self, slot: int, other: int) -> tuple[int, bool]:
         """Matrix row of the entry of two link rows, and whether it lies on a diagonal block."""

@@ -84,8 +84,10 @@ def fill(adjacency: Sequence[Iterable[int]], order: Sequence[int]) -> list[list[
     return pattern
 
 
-def _independent(rows: np.ndarray, kept: list[int], limit: float) -> list[int]:
-    """Extend ``kept`` by rows independent of it, largest remainder first (pivoted Gram-Schmidt)."""
+def _independent(
+    rows: np.ndarray, kept: list[int], limit: float, among: Sequence[int] | None = None
+) -> list[int]:
+    """Extend ``kept`` by rows (``among`` some) independent of it, largest remainder first (pivoted Gram-Schmidt)."""
     rest = rows.copy()
     size = np.maximum((rows**2).sum(axis=1), 1e-300)
 
@@ -99,6 +101,8 @@ def _independent(rows: np.ndarray, kept: list[int], limit: float) -> list[int]:
     while len(kept) < len(rows):
         left = (rest**2).sum(axis=1) / size
         left[kept] = 0.0
+        if among is not None:
+            left[np.setdiff1d(np.arange(len(rows)), among)] = 0.0
         row = int(left.argmax())
         if left[row] < limit:
             break
@@ -108,7 +112,10 @@ def _independent(rows: np.ndarray, kept: list[int], limit: float) -> list[int]:
 
 
 def independent_rods(
-    positions: np.ndarray, ends: Sequence[tuple[int, int]], inverse_mass: np.ndarray
+    positions: np.ndarray,
+    ends: Sequence[tuple[int, int]],
+    inverse_mass: np.ndarray,
+    first: Sequence[int] = (),
 ) -> list[int]:
     """Rods that suffice: the others are implied by them in every configuration.
 
@@ -120,6 +127,7 @@ def independent_rods(
         positions: (points, 3) start positions [m]; anchors after particles.
         ends: the two points of each rod.
         inverse_mass: (points,) [1/kg], 0 for anchors.
+        first: rods that are taken before any other.
     """
     if not ends:
         return []
@@ -134,7 +142,9 @@ def independent_rods(
             jacobian[row, b] -= weight[b] * direction
         return jacobian.reshape(len(ends), -1)
 
-    kept = _independent(rows(positions), [], 1e-9)
     scale = max(float(np.ptp(positions, axis=0).max()), 1.0)
-    generic = positions + rng.uniform(-scale, scale, positions.shape)
-    return sorted(_independent(rows(generic), kept, 1e-9))
+    generic = rows(positions + rng.uniform(-scale, scale, positions.shape))
+    kept = _independent(rows(positions), [], 1e-9, among=first)
+    kept = _independent(generic, kept, 1e-9, among=first)
+    kept = _independent(rows(positions), kept, 1e-9)
+    return sorted(_independent(generic, kept, 1e-9))

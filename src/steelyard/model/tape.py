@@ -23,6 +23,7 @@ from __future__ import annotations
     H_FREE,
     H_IMPULSE,
     H_UNSETTLED,
+    H_GIVEN_UP,
     H_NONFINITE,
     H_TIME,
     H_DT,
@@ -41,7 +42,9 @@ from __future__ import annotations
     H_USER_FORCES,
     H_WINCHES,
     H_LINKS,
+    H_MOVERS,
     H_RIDERS,
+    H_CLUSTERS,
     H_CONTACTS,
     H_GENERATORS,
     H_MATRIX,
@@ -51,6 +54,8 @@ from __future__ import annotations
     H_POINT_DIAGONALS,
     H_POINT_LINKS,
     H_POINT_POINTS,
+    H_WRENCHES,
+    H_WRENCH_PRODUCTS,
     H_REFERENCES,
     H_LINK_MASKS,
     H_PADDING,
@@ -69,8 +74,8 @@ from __future__ import annotations
     H_GUESS,
     H_MASK,
     H_USED_MASK,
-) = range(60)
-HEADER = 60
+) = range(65)
+HEADER = 65
 
 # Width of the records of links and contacts; ``model.compile`` writes them field by field.
 LINK = 17

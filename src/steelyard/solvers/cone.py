@@ -8,6 +8,7 @@ Gauss-Seidel on W, whose fixed point is the law itself.
 
 from __future__ import annotations
 
+from ..constraints.contacts import contact_multiplier
 from ..kernel import inner
 from ..math.lanes import absolute, any_lane, fma, load, select, splat, sqrt, store
 from ..model.tape import (
@@ -19,22 +20,25 @@ from ..model.tape import (
     H_CONTACT_PRODUCTS,
     H_CONTACTS,
     H_DENSE,
+    H_DT,
     H_GUESS,
     H_MASK,
     H_RIGHT,
     H_TOTAL,
 )
 from . import block_ldl
-from .cone_newton import SOFTNESS, newton, softened_motion
+from .cone_newton import newton, softened_motion
 from .cone_rows import relative_motion
 
 _SWEEPS = 200
-_REPEATS = 3
-_ANCHORS = 2
+_REPEATS = 4
+_ANCHORS = 3
+# Share of the allowed error that softness may leave.
+_PULL = 0.1
 
 
 @inner
-def factorise_contacts(tape, s, skip):
+def factorise_contacts(tape, s, skip, softness):
     """Factor of W over the masked rows, a little softened.
 
     Contacts joined by links share their load in more ways than one. A little softness on the diagonal makes
@@ -46,16 +50,17 @@ def factorise_contacts(tape, s, skip):
         taken = load(s, tape[k + 2]) * load(s, tape[k + 3])
         value = load(s, tape[k + 1]) * taken
         if tape[k + 4] >= 0:
-            value = fma(load(s, tape[k + 4]), splat(1.0 + SOFTNESS) - taken, value)
+            value = fma(load(s, tape[k + 4]), splat(1.0 + softness) - taken, value)
         store(s, tape[k], value)
     block_ldl.factor(tape, tape[H_CONTACT_FACTOR], s, skip)
 
 
 @inner
-def _stick(tape, s, skip):
+def _stick(tape, s, skip, first):
     """Solve W l = b over the masked rows into the guess rows.
 
-    Repeating the solve on what is left of b takes the factor's softness out (the proximal point method).
+    Repeating the solve on what is left of b takes the factor's softness out (the proximal point method). The
+    ``first`` of a stage's passes starts from nothing, which spreads friction evenly, others from the guess.
     """
     zero = splat(0.0)
     at = tape[H_CONTACTS]
@@ -64,7 +69,8 @@ def _stick(tape, s, skip):
     for index in range(tape[at]):
         slot = tape[at + 1 + CONTACT * index + 19]
         for row in range(slot, slot + 3):
-            store(s, total + row, zero)
+            value = zero if first else load(s, guess + row) * load(s, tape[H_MASK] + row)
+            store(s, total + row, value)
     for repeat in range(_REPEATS):
         k = tape[H_CONTACT_PRODUCTS] + 1
         for index in range(tape[at]):
@@ -76,7 +82,7 @@ def _stick(tape, s, skip):
                 a = load(s, right)
                 b = load(s, right + 1)
                 c = load(s, right + 2)
-                if repeat > 0:
+                if repeat > 0 or not first:
                     x, y, z = relative_motion(tape, s, skip, k, total)
                     a = a - x
                     b = b - y
@@ -130,7 +136,7 @@ def _violated(tape, s, skip, velocity):
 
 
 @inner
-def _sweep(tape, s, skip, velocity, worlds, allowed):
+def _sweep(tape, s, skip, velocity, worlds, allowed, softness):
     """Projected Gauss-Seidel on W in the worlds of the mask, from the guess rows; worlds that did not settle."""
     zero = splat(0.0)
     half = splat(0.5)
@@ -145,12 +151,12 @@ def _sweep(tape, s, skip, velocity, worlds, allowed):
                 slot = tape[contact + 19]
                 w = tape[k + 1]
                 possible = load(s, tape[contact + 18]) > half
-                a, b, c = softened_motion(tape, s, skip, contact, k)
+                a, b, c = softened_motion(tape, s, skip, contact, k, softness)
                 guess = tape[H_GUESS] + slot
                 n0 = load(s, guess)
                 t0 = load(s, guess + 1)
                 u0 = load(s, guess + 2)
-                soft = splat(SOFTNESS) * load(s, tape[k + 3])
+                soft = splat(softness) * load(s, tape[k + 3])
                 w00 = load(s, w) + soft
                 stiff = w00 > zero
                 step = select(stiff, a / select(stiff, w00, splat(1.0)), zero)
@@ -192,15 +198,21 @@ def _sweep(tape, s, skip, velocity, worlds, allowed):
 
 
 @inner
-def _put_back(tape, s, skip, worlds):
-    """Guess rows of ``worlds`` back to the multipliers at hand."""
+def _put_back(tape, s, skip, velocity, worlds):
+    """Guess rows of ``worlds`` back to the multipliers at hand, or for velocities to what the positions took.
+
+    A steady force F acts in the position stage by F dt^2/2 and in the velocity stage by F dt/2.
+    """
+    share = splat(1.0)
+    if velocity:
+        share = share / load(s, tape[H_DT])
     at = tape[H_CONTACTS]
     for index in range(tape[at]):
         contact = at + 1 + CONTACT * index
         if skip[tape[contact + 20]] == 0:
             for axis in range(3):
                 guess = tape[H_GUESS] + tape[contact + 19] + axis
-                old = load(s, tape[contact + 23] + axis)
+                old = share * load(s, contact_multiplier(tape, contact, False) + axis)
                 store(s, guess, select(worlds, old, load(s, guess)))
 
 
@@ -217,14 +229,35 @@ def _anchor(tape, s, skip):
 
 
 @inner
-def solve_contacts(tape, s, skip, velocity, allowed):
+def _pull(tape, s, skip, softness):
+    """Largest motion that softness leaves: compliance times the change of an impulse since the anchor."""
+    pull = splat(0.0)
+    at = tape[H_CONTACTS]
+    k = tape[H_CONTACT_PRODUCTS] + 1
+    for index in range(tape[at]):
+        contact = at + 1 + CONTACT * index
+        if skip[tape[contact + 20]] == 0:
+            soft = splat(softness) * load(s, tape[k + 3])
+            for axis in range(3):
+                held = load(s, tape[contact + 23] + 3 + axis)
+                change = load(s, tape[H_GUESS] + tape[contact + 19] + axis) - held
+                change = soft * absolute(change)
+                pull = select(change > pull, change, pull)
+        k += 5 + 4 * tape[k + 4]
+    return pull
+
+
+@inner
+def solve_contacts(tape, s, skip, velocity, allowed, softness, first, hasty):
     """Solve the contact problem left by elimination.
 
-    In: right rows hold b minus W times the present multipliers; guess rows the present multipliers. Out:
-    right rows hold the change of the multipliers, guess rows the new ones. Sweeps settle when they move
-    contacts by no more than ``allowed`` [m or m/s]. Returns the worlds that did not settle.
+    In: right rows hold b minus W times the present multipliers; guess rows the present multipliers. Out: right
+    rows hold the change of the multipliers, guess rows the new ones. Sweeps settle when they move contacts by
+    no more than ``allowed`` [m or m/s]. Returns the worlds that did not settle; if ``hasty``, those in which
+    loaded contacts do not stick.
     """
     zero = splat(0.0)
+    one = splat(1.0)
     at = tape[H_CONTACTS]
     k = tape[H_CONTACT_PRODUCTS] + 1
     for index in range(tape[at]):
@@ -239,18 +272,24 @@ def solve_contacts(tape, s, skip, velocity, allowed):
                 held = tape[H_GUESS] + tape[contact + 19] + axis
                 store(s, tape[contact + 23] + axis, load(s, held))
         k += 5 + 4 * tape[k + 4]
-    _stick(tape, s, skip)
+    _stick(tape, s, skip, first)
     bad = _violated(tape, s, skip, velocity)
     stuck = zero > zero
-    if any_lane(bad):
-        _put_back(tape, s, skip, bad)
+    if hasty:
+        stuck = bad
+    elif any_lane(bad):
+        _put_back(tape, s, skip, velocity, bad)
         for _ in range(_ANCHORS):
             _anchor(tape, s, skip)
-            stuck = bad
+            failed = bad
             if tape[H_DENSE] >= 0:
-                stuck = newton(tape, s, skip, velocity, bad)
-            if any_lane(stuck):
-                stuck = _sweep(tape, s, skip, velocity, stuck, allowed)
+                failed = newton(tape, s, skip, velocity, bad, softness)
+            if any_lane(failed):
+                failed = _sweep(tape, s, skip, velocity, failed, allowed, softness)
+            stuck = failed | (stuck & (select(bad, zero, one) > zero))
+            bad = bad & (_pull(tape, s, skip, softness) > splat(_PULL) * allowed)
+            if not any_lane(bad):
+                break
     for index in range(tape[at]):
         contact = at + 1 + CONTACT * index
         if skip[tape[contact + 20]] == 0:

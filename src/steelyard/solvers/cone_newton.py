@@ -19,15 +19,13 @@ from ..model.tape import CONTACT, H_CONTACT_PRODUCTS, H_CONTACTS, H_DENSE, H_GUE
 from .cone_rows import add_motion_row, relative_motion
 
 _ITERATIONS = 15
-#: Compliance of contacts, as a share of the inverse mass they act on; taken out again by repetition.
-SOFTNESS = 1e-5
 _SETTLED = 1e-11
 
 
 @inner
-def softened_motion(tape, s, skip, contact, k):
+def softened_motion(tape, s, skip, contact, k, softness):
     """W l - b + e (l - l0) of one contact at the guess: three lane vectors."""
-    soft = splat(SOFTNESS) * load(s, tape[k + 3])
+    soft = splat(softness) * load(s, tape[k + 3])
     slot = tape[contact + 19]
     guess = tape[H_GUESS] + slot
     right = tape[H_RIGHT] + slot
@@ -53,7 +51,7 @@ def _scales(s, w, soft):
 
 
 @inner
-def _contact_system(tape, s, skip, contact, k, velocity, first, width):
+def _contact_system(tape, s, skip, contact, k, velocity, first, width, softness):
     """Three rows of the system for one contact; its error and the size of its impulse."""
     zero = splat(0.0)
     one = splat(1.0)
@@ -64,11 +62,11 @@ def _contact_system(tape, s, skip, contact, k, velocity, first, width):
     last = width - 1
     for entry in range(3 * width):
         store(s, row + entry, zero)
-    un, ut, uu = softened_motion(tape, s, skip, contact, k)
+    un, ut, uu = softened_motion(tape, s, skip, contact, k, softness)
     n = load(s, guess)
     t = load(s, guess + 1)
     u = load(s, guess + 2)
-    soft = splat(SOFTNESS) * load(s, tape[k + 3])
+    soft = splat(softness) * load(s, tape[k + 3])
     rn, rt = _scales(s, tape[k + 1], soft)
     possible = load(s, tape[contact + 18]) > half
     loads = n - rn * un > zero
@@ -150,7 +148,7 @@ def _eliminate(s, dense, size):
 
 
 @inner
-def newton(tape, s, skip, velocity, worlds):
+def newton(tape, s, skip, velocity, worlds, softness):
     """Improve the guess rows of ``worlds``; the worlds that still miss the law afterwards."""
     zero = splat(0.0)
     one = splat(1.0)
@@ -167,7 +165,9 @@ def newton(tape, s, skip, velocity, worlds):
         for index in range(count):
             contact = at + 1 + CONTACT * index
             if skip[tape[contact + 20]] == 0:
-                wrong, extent = _contact_system(tape, s, skip, contact, k, velocity, first, width)
+                wrong, extent = _contact_system(
+                    tape, s, skip, contact, k, velocity, first, width, softness
+                )
                 error = error + wrong
                 largest = select(extent > largest, extent, largest)
             else:

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from ..collision.geometry import contact_geometry
+from ..constraints.clusters import cluster_frames
 from ..constraints.contacts import contact_targets
 from ..constraints.links import link_gradients, link_targets
 from ..constraints.riders import rider_coefficients
 from ..integrators.motion import add_stage_velocity, keep_free_velocity
-from ..kernel import inner
+from ..kernel import part
 from ..model.tape import DIRECT, H_POSITION, H_SOLVER, H_VELOCITY
-from .direct import refactor, solve_stage
+from .direct import solve_stage
 from .gauss_seidel import sweep_stage
+from .matrix import refactor
 
 
-@inner
+@part
 def begin_step(tape, s, skip, dt):
     """At the start of a step: gradients, contact frames, targets of the velocity stage.
 
@@ -22,33 +24,31 @@ def begin_step(tape, s, skip, dt):
     link_gradients(tape, s)
     link_targets(tape, s, dt)
     rider_coefficients(tape, s)
+    cluster_frames(tape, s)
     contact_geometry(tape, s)
     return contact_targets(tape, s, dt, skip)
 
 
-@inner
-def position_stage(tape, s, skip, dt, fresh):
-    """Put the drifted positions on the constraints; the velocities take the impulses along.
+@part
+def constraint_stage(tape, s, skip, velocity, dt, fresh, hasty):
+    """Put the drifted positions, or the kicked velocities, on the constraints.
 
-    ``fresh`` says that the factor at hand is not of the present gradients.
+    The velocities take the impulses of the position stage along. The velocity stage is at the new positions,
+    impacts included. ``fresh`` says that the factor at hand is not of the start's gradients; for ``hasty`` see
+    ``solve_stage``.
     """
+    target = tape[H_POSITION]
+    if velocity:
+        target = tape[H_VELOCITY]
+        link_gradients(tape, s)
+        rider_coefficients(tape, s)
+        cluster_frames(tape, s)
+        keep_free_velocity(tape, s)
     if tape[H_SOLVER] == DIRECT:
-        if fresh:
+        if velocity or fresh:
             refactor(tape, s, skip)
-        solve_stage(tape, s, skip, False, dt, tape[H_POSITION])
+        solve_stage(tape, s, skip, velocity, dt, target, hasty)
     else:
-        sweep_stage(tape, s, skip, False, tape[H_POSITION])
-    add_stage_velocity(tape, s, dt)
-
-
-@inner
-def velocity_stage(tape, s, skip, dt):
-    """Make the velocities follow the constraints at the new positions, impacts included."""
-    link_gradients(tape, s)
-    rider_coefficients(tape, s)
-    keep_free_velocity(tape, s)
-    if tape[H_SOLVER] == DIRECT:
-        refactor(tape, s, skip)
-        solve_stage(tape, s, skip, True, dt, tape[H_VELOCITY])
-    else:
-        sweep_stage(tape, s, skip, True, tape[H_VELOCITY])
+        sweep_stage(tape, s, skip, velocity, target)
+    if not velocity:
+        add_stage_velocity(tape, s, dt)
