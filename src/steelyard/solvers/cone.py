@@ -34,7 +34,7 @@ _SWEEPS = 200
 _REPEATS = 4
 _ANCHORS = 3
 # Share of the allowed error that softness may leave.
-_PULL = 0.1
+_PULL = 1e-3
 
 
 @inner
