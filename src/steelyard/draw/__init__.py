@@ -2,5 +2,6 @@
 
 from . import palette
 from .primitives import Circle, Drawing, Face, Line, Text
+from .world import draw_world
 
-__all__ = ["Circle", "Drawing", "Face", "Line", "Text", "palette"]
+__all__ = ["Circle", "Drawing", "Face", "Line", "Text", "draw_world", "palette"]

@@ -1,0 +1,76 @@
+"""A world's drawing shows everything it holds, where it is."""
+
+import numpy as np
+import pytest
+
+import steelyard as sy
+from steelyard.draw import palette
+
+
+def one_of_each() -> sy.Scene:
+    scene = sy.Scene()
+    a = scene.add(sy.Particle(position=(0.0, 3.0, 0.0)))
+    b = scene.add(sy.Particle(position=(1.0, 3.0, 0.0)))
+    c = scene.add(sy.Particle(position=(0.0, 0.2, 1.0), radius=0.2))
+    post = scene.add(sy.Particle(position=(4.0, 3.0, 0.0), inverse_mass=0.0))
+    load = scene.add(sy.Particle(position=(0.5, 3.0, 0.0)))
+    scene.add(sy.Rod(a, b))
+    scene.add(sy.RodConstraint(a, anchor=(0.0, 5.0, 0.0)))
+    scene.add(sy.Cable(b, post, max_length=3.0))
+    scene.add(sy.CableConstraint(b, anchor=(1.0, 5.0, 0.0), max_length=9.0))
+    scene.add(sy.Spring(a, c, stiffness=1.0, rest_length=1.0))
+    scene.add(sy.Bungee(b, c, stiffness=1.0, rest_length=9.0))
+    scene.add(sy.AnchoredSpring(c, anchor=(2.0, 2.0, 2.0), stiffness=1.0, rest_length=9.0))
+    scene.add(sy.Rider(load, [a, b]))
+    scene.add(sy.Ground())
+    scene.add(sy.LinePlatform(start=(5.0, 1.0, 0.0), end=(7.0, 1.0, 0.0), radius=0.1))
+    return scene
+
+
+def test_every_thing_is_drawn_where_it_is() -> None:
+    world = sy.World(one_of_each(), worlds=3)
+    world.particles.position[2, :, 0] += 1.0
+    drawing = sy.draw.draw_world(world, 2)
+    balls = [circle for circle in drawing.circles if circle.fill]
+    centres = np.array([circle.centre for circle in balls])
+    for place in world.particles.position[2]:
+        assert np.abs(centres - place).sum(axis=1).min() == 0.0
+    assert sum(circle.color == palette.LOAD for circle in balls) == 1
+    assert max(circle.radius for circle in balls) == 0.2
+    colors = {line.color for line in drawing.lines}
+    assert {palette.STEEL, palette.ROPE, palette.TARGET, palette.WIND, palette.EARTH} <= colors
+    # Slack: the cable to the anchor and the bungee; the cable to the post is taut in the world that was moved.
+    assert any(len(color) == 4 for color in colors)
+    assert len(drawing.faces) == 1
+
+
+def test_touching_contacts_are_marked_and_no_others() -> None:
+    world = sy.World(one_of_each())
+    rings = [circle for circle in sy.draw.draw_world(world).circles if not circle.fill]
+    assert [ring.centre for ring in rings] == [(0.0, 0.0, 1.0)]
+    world.particles.position[0, 2, 1] = 1.0
+    assert all(circle.fill for circle in sy.draw.draw_world(world).circles)
+
+
+def test_forces_are_arrows_in_proportion() -> None:
+    scene = sy.Scene(gravity=(0.0, -10.0, 0.0))
+    for mass in (1.0, 3.0):
+        scene.add(sy.Particle(position=(mass, 1.0, 0.0), mass=mass))
+    drawing = sy.draw.draw_world(sy.World(scene), forces=True)
+    shafts = [
+        np.subtract(line.end, line.start) for line in drawing.lines if line.end[0] == line.start[0]
+    ]
+    lengths = sorted(np.linalg.norm(shaft) for shaft in shafts)
+    assert lengths[-1] == pytest.approx(3.0 * lengths[0])
+    assert all(shaft[1] < 0.0 for shaft in shafts)
+
+
+def test_a_broken_world_still_makes_a_drawing() -> None:
+    world = sy.World(one_of_each())
+    world.particles.position[0, 0] = np.nan
+    assert sy.draw.draw_world(world, forces=True).circles
+
+
+def test_a_world_that_is_not_there_is_refused() -> None:
+    with pytest.raises(IndexError, match="index is 3"):
+        sy.draw.draw_world(sy.World(one_of_each(), worlds=3), 3)
