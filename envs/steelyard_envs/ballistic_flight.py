@@ -65,7 +65,7 @@ def gap(flight, w, drag, rate, time):
     return x - target_x, y - flight[TARGET + 1, w], z - target_z, u - target_u, v, s - target_s
 
 
-@sy.kernel
+@sy.inner
 def _sought(goal, flight, w, drag, rate, radius, time):
     x, y, z, u, v, s = gap(flight, w, drag, rate, time)
     if goal == _HEIGHT:
@@ -75,7 +75,7 @@ def _sought(goal, flight, w, drag, rate, radius, time):
     return x * x + y * y + z * z - radius * radius
 
 
-@sy.kernel
+@sy.inner
 def _root(goal, flight, w, drag, rate, radius, high):
     """Where in [0, high] ``_sought`` changes its sign, from the far side; ``high`` if it does not.
 
@@ -105,7 +105,7 @@ def _root(goal, flight, w, drag, rate, radius, high):
     return high
 
 
-@sy.kernel
+@sy.inner
 def _nearest(flight, w, drag, rate, end):
     """When in [0, end] the shot is nearest to the target's centre.
 
@@ -117,7 +117,7 @@ def _nearest(flight, w, drag, rate, end):
     return _root(_APPROACH, flight, w, drag, rate, 0.0, end)
 
 
-@sy.kernel
+@sy.inner
 def _note(flight, w, drag, rate, time):
     """Keep the gap at a time of the step if it is the flight's least."""
     x, y, z, _, _, _ = gap(flight, w, drag, rate, time)
@@ -132,7 +132,7 @@ def _note(flight, w, drag, rate, time):
         flight[NEAREST + 2, w] = y
 
 
-@sy.kernel
+@sy.inner
 def _end(flight, w, drag, rate, event, time):
     """Keep what came of the shot."""
     x, y, z, _, _, _ = gap(flight, w, drag, rate, time)

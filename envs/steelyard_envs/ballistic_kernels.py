@@ -23,6 +23,7 @@ from steelyard_envs.ballistic_flight import (
     move_target,
     target_motion,
 )
+from steelyard_envs.clip import clip
 from steelyard_envs.task import PHYSICS_ERROR, SUCCESS, TERMINATED, TRUNCATED
 
 AZIMUTH_RATE, ELEVATION_RATE = 1.0, 0.5  # [rad/s]
@@ -43,7 +44,7 @@ CROSSING = 12.0  # time in which a moving target runs from one random place to a
 POSITION, VELOCITY, NONFINITE = range(3)
 
 
-@sy.kernel
+@sy.inner
 def _somewhere(streams, w, near, far):
     """A random place x, z in the sector, uniform in range and azimuth."""
     reach = sy.uniform_between(streams, w, near, far)
@@ -82,14 +83,14 @@ def begin(mask, values, flight, streams, settings):
         flight[ANGLE, w] = 2.0 * math.pi * sy.uniform(streams, w)
 
 
-@sy.kernel
+@sy.inner
 def _turned(angle, action, change, low, high):
     """An angle of the barrel after a step at the commanded rate; it stops at its limits."""
     command = min(max(np.float64(action), -1.0), 1.0) if action == action else 0.0
     return min(max(angle + change * command, low), high)
 
 
-@sy.kernel
+@sy.inner
 def _control(actions, values, flight, settings, layout, state, given):
     """Fire along the aim that was observed, then turn the barrel."""
     dt, speed, drag = settings[DT], settings[SPEED], settings[DRAG]
@@ -125,7 +126,7 @@ def _control(actions, values, flight, settings, layout, state, given):
         )
 
 
-@sy.kernel
+@sy.inner
 def _follow(count, values, flight, settings, layout, state):
     """What came of the shots in this step."""
     dt, drag, rate, radius = settings[DT], settings[DRAG], settings[WEAVE_RATE], settings[RADIUS]
@@ -137,12 +138,6 @@ def _follow(count, values, flight, settings, layout, state):
             age = (values[ELAPSED, w] - values[FIRED_AT, w]) * dt
             follow_shot(flight, state, position, velocity, w, dt, drag, rate, radius, age)
         move_target(flight, w, dt, rate)
-
-
-@sy.kernel
-def _clip(value, most):
-    """``value`` within -most and most, 0 if it is not a number."""
-    return min(max(value, -most), most) if value == value else 0.0
 
 
 @sy.kernel
@@ -164,26 +159,26 @@ def observe(mask, values, flight, settings, layout, state, observations):
         row[1] = values[ELEVATION, w]
         row[2] = min(max(settings[RELOAD_STEPS] - since, 0.0) * dt, RELOAD)
         row[3] = values[LEFT, w]
-        row[4] = _clip(reach, 500.0)
-        row[5] = _clip(math.atan2(target_x, target_z) - values[AZIMUTH, w], 3.0)
+        row[4] = clip(reach, -500.0, 500.0)
+        row[5] = clip(math.atan2(target_x, target_z) - values[AZIMUTH, w], -3.0, 3.0)
         row[6] = flight[TARGET + 1, w]
-        row[7] = _clip(speed_x * sine + speed_z * cosine, 50.0)
-        row[8] = _clip(speed_x * cosine - speed_z * sine, 50.0)
+        row[7] = clip(speed_x * sine + speed_z * cosine, -50.0, 50.0)
+        row[8] = clip(speed_x * cosine - speed_z * sine, -50.0, 50.0)
         row[9] = seen * (values[WIND_X, w] * sine + values[WIND_Z, w] * cosine)
         row[10] = seen * (values[WIND_X, w] * cosine - values[WIND_Z, w] * sine)
         row[11] = flying
-        row[12] = flying * _clip(gap_x * sine + gap_z * cosine, 500.0)
-        row[13] = flying * _clip(gap_x * cosine - gap_z * sine, 500.0)
-        row[14] = flying * _clip(state[x + 1, w] - flight[TARGET + 1, w], 500.0)
-        row[15] = _clip(state[v, w] * sine + state[v + 2, w] * cosine, 150.0)
-        row[16] = _clip(state[v, w] * cosine - state[v + 2, w] * sine, 150.0)
-        row[17] = _clip(state[v + 1, w], 150.0)
+        row[12] = flying * clip(gap_x * sine + gap_z * cosine, -500.0, 500.0)
+        row[13] = flying * clip(gap_x * cosine - gap_z * sine, -500.0, 500.0)
+        row[14] = flying * clip(state[x + 1, w] - flight[TARGET + 1, w], -500.0, 500.0)
+        row[15] = clip(state[v, w] * sine + state[v + 2, w] * cosine, -150.0, 150.0)
+        row[16] = clip(state[v, w] * cosine - state[v + 2, w] * sine, -150.0, 150.0)
+        row[17] = clip(state[v + 1, w], -150.0, 150.0)
         row[18] = flying * since * dt
         for c in range(3):
-            row[19 + c] = _clip(flight[MISS + c, w], 500.0)
+            row[19 + c] = clip(flight[MISS + c, w], -500.0, 500.0)
 
 
-@sy.kernel
+@sy.inner
 def _judge(values, flight, settings, layout, state, rewards, flags):
     """Rewards and flags after a step; the number of episodes that ended."""
     ended = 0

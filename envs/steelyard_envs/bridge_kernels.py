@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 import steelyard as sy
+from steelyard_envs.clip import clip
 from steelyard_envs.task import PHYSICS_ERROR, SUCCESS, TERMINATED, TRUNCATED
 
 PAIRS, SPACING = 6, 1.9  # node pairs; planks between them [m]
@@ -32,7 +33,7 @@ POSITION, VELOCITY, WEIGHTS, RATES, ACCELERATIONS, PUSH, NONFINITE = range(7)
 LENGTH, WINCH_RATE, WINCH_GAIN, PULL = 7, 19, 31, 43
 
 
-@sy.kernel
+@sy.inner
 def _next_leg(values, streams, settings, w):
     """Draw how the load goes on: it pauses, turns back or walks on, and wanders across."""
     kind = sy.uniform(streams, w)
@@ -49,7 +50,7 @@ def _next_leg(values, streams, settings, w):
     values[WANTED_ACROSS, w] = 0.5 + settings[DRIFT] * sy.uniform_between(streams, w, -1.0, 1.0)
 
 
-@sy.kernel
+@sy.inner
 def _next_gust(values, streams, settings, w):
     """Draw when, how long, where and how the wind blows next."""
     values[GUST, w] = values[GUST_END, w] + sy.uniform_between(streams, w, 0.2, 1.5)
@@ -79,13 +80,13 @@ def begin(mask, values, streams, settings, layout, starts, state):
         _sense(values, settings, layout, state, w, 1.0)
 
 
-@sy.kernel
+@sy.inner
 def _towards(speed, wanted, change):
     """``speed`` moved to ``wanted`` by at most ``change``."""
     return speed + min(max(wanted - speed, -change), change)
 
 
-@sy.kernel
+@sy.inner
 def _fastest(rest, speed, dt):
     """Speed after a step from which the load can still stop within the ``rest`` of its way."""
     half = 0.5 * ACCELERATION * dt
@@ -93,7 +94,7 @@ def _fastest(rest, speed, dt):
     return max(math.sqrt(max(square, 0.0)) - half, 0.0)
 
 
-@sy.kernel
+@sy.inner
 def _walk(values, streams, settings, w):
     """Place and speed of the load after the control step; it stops at the ends of its way."""
     dt = settings[DT]
@@ -122,7 +123,7 @@ def _walk(values, streams, settings, w):
     values[LOAD_SLIDE, w] = slide
 
 
-@sy.kernel
+@sy.inner
 def _share(offset):
     """Share of a pair in a load that stands ``offset`` planks beyond it, and the share's slope.
 
@@ -141,7 +142,7 @@ def _share(offset):
     return share, (slope if offset > 0.0 else -slope)
 
 
-@sy.kernel
+@sy.inner
 def _move_load(values, streams, settings, layout, state, w):
     """Move the rider's weights at constant acceleration to what the load's next place asks for."""
     dt = settings[DT]
@@ -186,7 +187,7 @@ def blow(values, streams, settings, layout, state, w):
             state[layout[VELOCITY] + 3 * node + 2, w] += kick * values[GUST_Z, w]
 
 
-@sy.kernel
+@sy.inner
 def _wind_winches(actions, values, settings, layout, state, w):
     """Speed the winches up to what is asked, within their limits, over the control step."""
     dt = settings[DT]
@@ -206,7 +207,7 @@ def _wind_winches(actions, values, settings, layout, state, w):
         values[WINCH + k, w] = rate
 
 
-@sy.kernel
+@sy.inner
 def _sense(values, settings, layout, state, w, share):
     """Tension of every pair and force of the deck on the load, smoothed as sensors do."""
     for k in range(PAIRS):
@@ -247,12 +248,6 @@ def slides(values, layout, state, w):
 
 
 @sy.kernel
-def _clip(value, low, high):
-    """``value`` within bounds, 0 if it is not a number."""
-    return min(max(value if value == value else 0.0, low), high)
-
-
-@sy.kernel
 def observe(mask, values, layout, state, observations):
     """Observations of the worlds of ``mask``."""
     position = layout[POSITION]
@@ -266,24 +261,24 @@ def observe(mask, values, layout, state, observations):
             height = 0.5 * (state[position + near, w] + state[position + far, w]) - level
             climb = 0.5 * (state[velocity + near, w] + state[velocity + far, w])
             roll = 0.5 * (state[position + far, w] - state[position + near, w])
-            observations[w, k] = _clip(height, -2.0, 2.0)
-            observations[w, 6 + k] = _clip(climb, -5.0, 5.0)
-            observations[w, 12 + k] = _clip(roll, -1.0, 1.0)
-            observations[w, 18 + k] = _clip(state[layout[LENGTH + 2 * k], w], SHORT, LONG)
-            observations[w, 24 + k] = _clip(values[TENSION + k, w] / STALL, 0.0, 5.0)
+            observations[w, k] = clip(height, -2.0, 2.0)
+            observations[w, 6 + k] = clip(climb, -5.0, 5.0)
+            observations[w, 12 + k] = clip(roll, -1.0, 1.0)
+            observations[w, 18 + k] = clip(state[layout[LENGTH + 2 * k], w], SHORT, LONG)
+            observations[w, 24 + k] = clip(values[TENSION + k, w] / STALL, 0.0, 5.0)
         along, across = deck(values, layout, state, w, 1)
         place = SPACING * (values[PLACE, w] - 0.5 * (PAIRS - 1))
-        observations[w, 30] = _clip(place, -3.8, 3.8)
-        observations[w, 31] = _clip(2.0 * values[ACROSS, w] - 1.0, -1.0, 1.0)
-        observations[w, 32] = _clip(SPACING * values[LOAD_SPEED, w], -2.0, 2.0)
-        observations[w, 33] = _clip(2.0 * values[LOAD_SLIDE, w], -0.5, 0.5)
+        observations[w, 30] = clip(place, -3.8, 3.8)
+        observations[w, 31] = clip(2.0 * values[ACROSS, w] - 1.0, -1.0, 1.0)
+        observations[w, 32] = clip(SPACING * values[LOAD_SPEED, w], -2.0, 2.0)
+        observations[w, 33] = clip(2.0 * values[LOAD_SLIDE, w], -0.5, 0.5)
         height = state[position + 6 * PAIRS + 1, w] - level
-        observations[w, 34] = _clip(height, -2.0, 2.0)
-        observations[w, 35] = _clip(along / SPACING, -1.0, 1.0)
-        observations[w, 36] = _clip(0.5 * across, -1.0, 1.0)
+        observations[w, 34] = clip(height, -2.0, 2.0)
+        observations[w, 35] = clip(along / SPACING, -1.0, 1.0)
+        observations[w, 36] = clip(0.5 * across, -1.0, 1.0)
 
 
-@sy.kernel
+@sy.inner
 def _judge(values, settings, layout, state, observations, rewards, flags):
     """Rewards and flags after a step; the number of episodes that ended."""
     ended = 0

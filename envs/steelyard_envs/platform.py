@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 import steelyard as sy
+from steelyard_envs.clip import clip
 from steelyard_envs.single import TaskEnv
 from steelyard_envs.task import PHYSICS_ERROR, SUCCESS, TERMINATED, TRUNCATED, Array, Task
 from steelyard_envs.vector import TaskVectorEnv
@@ -67,13 +68,13 @@ def _begin(mask, values, streams, settings, layout, state):
             state[position + 3 * p + 1, w] = sine * x + cosine * y
 
 
-@sy.kernel
+@sy.inner
 def _towards(speed, wanted, change):
     """``speed`` moved to ``wanted`` by at most ``change``."""
     return speed + min(max(wanted - speed, -change), change)
 
 
-@sy.kernel
+@sy.inner
 def _move(action, values, w, axis, dt, size):
     """Speed up towards the commanded speed and move at constant acceleration; stop at the deck's edge."""
     wanted = SPEED[axis] * min(max(action, -1.0), 1.0) if action == action else 0.0
@@ -87,7 +88,7 @@ def _move(action, values, w, axis, dt, size):
     values[_ALONG + axis, w] = place
 
 
-@sy.kernel
+@sy.inner
 def _control(actions, values, streams, settings, layout, state):
     """Move the load as commanded and push the deck when it is time."""
     dt = settings[_DT]
@@ -129,12 +130,6 @@ def _control(actions, values, streams, settings, layout, state):
 
 
 @sy.kernel
-def _clip(value, low, high):
-    """``value`` within bounds, 0 if it is not a number."""
-    return min(max(value if value == value else 0.0, low), high)
-
-
-@sy.kernel
 def _observe(mask, values, layout, state, observations):
     """Observations of the worlds of ``mask``."""
     position = layout[_POSITION]
@@ -156,20 +151,20 @@ def _observe(mask, values, layout, state, observations):
         observations[w, 1] = WIDTH * (values[_ACROSS, w] - 0.5)
         observations[w, 2] = values[_SPEED_X, w]
         observations[w, 3] = values[_SPEED_Z, w]
-        observations[w, 4] = _clip((right - left) / (2.0 * LENGTH), -1.0, 1.0)
-        observations[w, 5] = _clip((front - back) / (2.0 * WIDTH), -1.0, 1.0)
-        observations[w, 6] = _clip(rise / (2.0 * LENGTH), -10.0, 10.0)
-        observations[w, 7] = _clip(lean / (2.0 * WIDTH), -10.0, 10.0)
-        observations[w, 8] = _clip(turn / (2.0 * LENGTH), -1.0, 1.0)
+        observations[w, 4] = clip((right - left) / (2.0 * LENGTH), -1.0, 1.0)
+        observations[w, 5] = clip((front - back) / (2.0 * WIDTH), -1.0, 1.0)
+        observations[w, 6] = clip(rise / (2.0 * LENGTH), -10.0, 10.0)
+        observations[w, 7] = clip(lean / (2.0 * WIDTH), -10.0, 10.0)
+        observations[w, 8] = clip(turn / (2.0 * LENGTH), -1.0, 1.0)
         for foot in range(2):
-            observations[w, 9 + foot] = _clip(state[position + 3 * foot + 1, w], -1.0, 5.0)
+            observations[w, 9 + foot] = clip(state[position + 3 * foot + 1, w], -1.0, 5.0)
         for axis in range(2):
             a = state[position + 2 * axis, w]
             b = state[position + 3 + 2 * axis, w]
-            observations[w, 11 + axis] = _clip(0.5 * (a + b), -5.0, 5.0)
+            observations[w, 11 + axis] = clip(0.5 * (a + b), -5.0, 5.0)
 
 
-@sy.kernel
+@sy.inner
 def _off_balance(state, layout, w):
     """How far the extrapolated centre of mass of deck and load is from over the feet along x [m].
 
@@ -185,7 +180,7 @@ def _off_balance(state, layout, w):
     return x / (LOAD + DECK_MASS) - 0.5 * (state[position, w] + state[position + 3, w])
 
 
-@sy.kernel
+@sy.inner
 def _judge(actions, values, settings, layout, state, observations, rewards, flags):
     """Rewards and flags after a step; the number of episodes that ended."""
     ended = 0

@@ -5,7 +5,7 @@ from .integrators.closed_form import ClosedForm, flight, flight_fall_time, fligh
 from .integrators.explicit_euler import ExplicitEuler
 from .integrators.rattle import Rattle
 from .integrators.symplectic_euler import SymplecticEuler
-from .kernel import kernel
+from .kernel import inner, kernel
 from .math.random import normal, uniform, uniform_between
 from .methods import Method
 from .scene.contacts import ContactGenerator, Ground, LinePlatform
@@ -64,6 +64,7 @@ __all__ = [
     "flight",
     "flight_fall_time",
     "flight_impact",
+    "inner",
     "kernel",
     "normal",
     "scenes",
