@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .math.lanes import LANES
-from .model.compile import PARTICLES, Model
-from .model.parameters import Key
+from .model.compile import Model
+from .model.parameters import PARTICLES, Key
 from .scene import checks
 from .scene.particle import Particle
 from .stepping import PICKED

@@ -13,8 +13,8 @@ from .diagnostics.health import health_flags
 from .diagnostics.residual import link_residuals
 from .math.lanes import LANES
 from .methods import DEFAULT, Method
-from .model.compile import PARTICLES, Model, compile_model
-from .model.parameters import Key
+from .model.compile import Model, compile_model
+from .model.parameters import PARTICLES, Key
 from .model.tape import H_DAMPED
 from .scene import checks
 from .scene.contacts import ContactGenerator

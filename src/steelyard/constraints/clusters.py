@@ -11,7 +11,7 @@ inertia J of the particles held by rods, the moment is
 
     q0 J q + q x J q + sum over loads of m/2 r0 x (R - 1) r1 = L/2,    L = sum m r0 x (x - c1 - r1),
 
-three equations (Moser & Veselov 1991), solved by Newton's method. Impulses follow from displacements, not from
+three equations (Moser & Veselov 1991; ``cluster_turn``). Impulses follow from displacements, not from
 places, so that rounding takes no momentum; places have the exact shape, which therefore cannot drift. The
 velocity stage gives all particles V + w x r, loads their motion over the deck besides.
 
@@ -23,35 +23,35 @@ weights, rates and work (arm, r0, r1, motion), count, then arms of its deck. Par
 from __future__ import annotations
 
 from ..kernel import inner
-from ..math.lanes import any_lane, fma, load, select, splat, sqrt, store
+from ..math.lanes import fma, load, splat, store
 from ..math.vectors import (
     cross,
     dot,
     load_vector,
-    solve,
     store_vector,
     symmetric_inverse,
     symmetric_product,
     unit,
 )
 from ..model.tape import (
+    AFTER,
+    ARM,
+    ARMS,
+    BEFORE,
+    CENTRE,
+    CLUSTER_HEAD,
     H_CLUSTERS,
     H_IMPULSE,
     H_POSITION,
     H_START,
-    H_TOLERANCE,
-    H_UNSETTLED,
+    INERTIA,
+    INVERSE,
+    LOAD_HEAD,
+    MOTION,
+    SHIFT,
+    TURN,
 )
-
-HEAD = 11
-LOAD_HEAD = 6
-#: Work rows: inertia, inverse of that with loads, quaternion, shift of the centre by loads, centre, arms.
-INERTIA, INVERSE, TURN, SHIFT, CENTRE, ARMS = 0, 6, 12, 15, 18, 21
-#: Work rows of a load: its arm, r0 and r1 of the moment's equation, motion over the deck.
-ARM, BEFORE, AFTER, MOTION = 0, 3, 6, 9
-_ITERATIONS = 12
-# Newton's method squares the error: what a change leaves is about its square. It may be this share of the tolerance.
-_SHARE = 1e-6
+from .cluster_turn import turn
 
 
 @inner
@@ -136,7 +136,7 @@ def cluster_frames(tape, s):
         sx = zero
         sy = zero
         sz = zero
-        rider = at + HEAD + count
+        rider = at + CLUSTER_HEAD + count
         for k in range(tape[at + 1]):
             m = load(s, tape[at + 4] + k)
             x, y, z = _mean_arm(tape, s, rider, tape[rider + 1])
@@ -157,7 +157,7 @@ def cluster_frames(tape, s):
             _add_point(s, work + INVERSE, zero - load(s, tape[at + 5]), sx, sy, sz)
             for k in range(count):
                 _move(s, work + ARMS + 3 * k, sx, sy, sz)
-            rider = at + HEAD + count
+            rider = at + CLUSTER_HEAD + count
             for _ in range(tape[at + 1]):
                 _move(s, tape[rider + 4] + ARM, sx, sy, sz)
                 rider += LOAD_HEAD + tape[rider + 5]
@@ -185,7 +185,7 @@ def _place_loads(tape, s, at):
     dx = x0
     dy = y0
     dz = z0
-    rider = at + HEAD + tape[at]
+    rider = at + CLUSTER_HEAD + tape[at]
     for k in range(tape[at + 1]):
         own = tape[rider + 4]
         m = load(s, tape[at + 4] + k)
@@ -203,7 +203,7 @@ def _place_loads(tape, s, at):
         dz = fma(share, z, dz)
         rider += LOAD_HEAD + tape[rider + 5]
     # Arms of loads: less the centre of mass at the end, which is the start's less the shift.
-    rider = at + HEAD + tape[at]
+    rider = at + CLUSTER_HEAD + tape[at]
     for _ in range(tape[at + 1]):
         own = tape[rider + 4]
         _move(s, own + AFTER, x0 - dx, y0 - dy, z0 - dz)
@@ -235,11 +235,11 @@ def _mean(tape, s, at, target, base):
     z = zero
     for k in range(tape[at]):
         m = load(s, tape[at + 3] + k)
-        a, b, c = _row(s, target, base, tape[at + HEAD + k])
+        a, b, c = _row(s, target, base, tape[at + CLUSTER_HEAD + k])
         x = fma(m, a, x)
         y = fma(m, b, y)
         z = fma(m, c, z)
-    rider = at + HEAD + tape[at]
+    rider = at + CLUSTER_HEAD + tape[at]
     for k in range(tape[at + 1]):
         m = load(s, tape[at + 4] + k)
         a, b, c = _row(s, target, base, tape[rider])
@@ -262,12 +262,12 @@ def _moment(tape, s, at, target, base, cx, cy, cz):
     for k in range(tape[at]):
         m = load(s, tape[at + 3] + k)
         rx, ry, rz = load_vector(s, arms + 3 * k)
-        x, y, z = _row(s, target, base, tape[at + HEAD + k])
+        x, y, z = _row(s, target, base, tape[at + CLUSTER_HEAD + k])
         x, y, z = cross(rx, ry, rz, x - cx, y - cy, z - cz)
         lx = fma(m, x, lx)
         ly = fma(m, y, ly)
         lz = fma(m, z, lz)
-    rider = at + HEAD + tape[at]
+    rider = at + CLUSTER_HEAD + tape[at]
     for k in range(tape[at + 1]):
         own = tape[rider + 4]
         m = load(s, tape[at + 4] + k)
@@ -280,102 +280,6 @@ def _moment(tape, s, at, target, base, cx, cy, cz):
         lz = fma(m, z, lz)
         rider += LOAD_HEAD + tape[rider + 5]
     return lx, ly, lz
-
-
-@inner
-def _turn(tape, s, at, hx, hy, hz, worlds):
-    """The quaternion that solves the moment's equation, from the one at hand; kept in the work rows."""
-    zero = splat(0.0)
-    one = splat(1.0)
-    two = splat(2.0)
-    least = splat(1e-3)
-    allowed = fma(splat(_SHARE), load(s, tape[H_TOLERANCE]), splat(1e-20))
-    work = tape[at + 7]
-    row = work + INERTIA
-    j00 = load(s, row)
-    j10 = load(s, row + 1)
-    j11 = load(s, row + 2)
-    j20 = load(s, row + 3)
-    j21 = load(s, row + 4)
-    j22 = load(s, row + 5)
-    x, y, z = load_vector(s, work + TURN)
-    root = one - dot(x, y, z, x, y, z)
-    root = sqrt(select(root > least, root, least))
-    moving = worlds
-    for _ in range(_ITERATIONS):
-        u, v, w = symmetric_product(s, row, x, y, z)
-        gx, gy, gz = cross(x, y, z, u, v, w)
-        ex = hx - fma(root, u, gx)
-        ey = hy - fma(root, v, gy)
-        ez = hz - fma(root, w, gz)
-        # Derivative of the particles' part: q0 J - (J q) q^T / q0 + [q] J - [J q], column by column.
-        share = zero - one / root
-        sx = share * x
-        sy = share * y
-        sz = share * z
-        ax, ay, az = cross(x, y, z, j00, j10, j20)
-        ax = fma(u, sx, fma(root, j00, ax))
-        ay = fma(v, sx, fma(root, j10, ay)) - w
-        az = fma(w, sx, fma(root, j20, az)) + v
-        bx, by, bz = cross(x, y, z, j10, j11, j21)
-        bx = fma(u, sy, fma(root, j10, bx)) + w
-        by = fma(v, sy, fma(root, j11, by))
-        bz = fma(w, sy, fma(root, j21, bz)) - u
-        cx, cy, cz = cross(x, y, z, j20, j21, j22)
-        cx = fma(u, sz, fma(root, j20, cx)) - v
-        cy = fma(v, sz, fma(root, j21, cy)) + u
-        cz = fma(w, sz, fma(root, j22, cz))
-        rider = at + HEAD + tape[at]
-        for _ in range(tape[at + 1]):
-            # Of a load's: (R - 1) r = 2 (q0 q x r + q x (q x r)), between r0 and the change of q.
-            px, py, pz = load_vector(s, tape[rider + 4] + BEFORE)
-            rx, ry, rz = load_vector(s, tape[rider + 4] + AFTER)
-            tx, ty, tz = cross(x, y, z, rx, ry, rz)
-            ox, oy, oz = cross(x, y, z, tx, ty, tz)
-            ox, oy, oz = cross(px, py, pz, fma(root, tx, ox), fma(root, ty, oy), fma(root, tz, oz))
-            ex = fma(zero - two, ox, ex)
-            ey = fma(zero - two, oy, ey)
-            ez = fma(zero - two, oz, ez)
-            # Columns of -t q^T/q0 - [q0 r + t] + (q.r) 1 - r q^T, and p x them.
-            nx = fma(root, rx, tx)
-            ny = fma(root, ry, ty)
-            nz = fma(root, rz, tz)
-            along = dot(x, y, z, rx, ry, rz)
-            ox = fma(tx, sx, fma(zero - rx, x, along))
-            oy = fma(ty, sx, fma(zero - ry, x, zero - nz))
-            oz = fma(tz, sx, fma(zero - rz, x, ny))
-            ox, oy, oz = cross(px, py, pz, ox, oy, oz)
-            ax = fma(two, ox, ax)
-            ay = fma(two, oy, ay)
-            az = fma(two, oz, az)
-            ox = fma(tx, sy, fma(zero - rx, y, nz))
-            oy = fma(ty, sy, fma(zero - ry, y, along))
-            oz = fma(tz, sy, fma(zero - rz, y, zero - nx))
-            ox, oy, oz = cross(px, py, pz, ox, oy, oz)
-            bx = fma(two, ox, bx)
-            by = fma(two, oy, by)
-            bz = fma(two, oz, bz)
-            ox = fma(tx, sz, fma(zero - rx, z, zero - ny))
-            oy = fma(ty, sz, fma(zero - ry, z, nx))
-            oz = fma(tz, sz, fma(zero - rz, z, along))
-            ox, oy, oz = cross(px, py, pz, ox, oy, oz)
-            cx = fma(two, ox, cx)
-            cy = fma(two, oy, cy)
-            cz = fma(two, oz, cz)
-            rider += LOAD_HEAD + tape[rider + 5]
-        ox, oy, oz = solve(ax, ay, az, bx, by, bz, cx, cy, cz, ex, ey, ez)
-        x = x + select(moving, ox, zero)
-        y = y + select(moving, oy, zero)
-        z = z + select(moving, oz, zero)
-        root = one - dot(x, y, z, x, y, z)
-        root = sqrt(select(root > least, root, least))
-        moving = moving & (dot(ox, oy, oz, ox, oy, oz) > allowed)
-        if not any_lane(moving):
-            break
-    store_vector(s, work + TURN, x, y, z)
-    flag = tape[H_UNSETTLED]
-    store(s, flag, select(moving, one, load(s, flag)))
-    return x, y, z, root
 
 
 @inner
@@ -397,7 +301,7 @@ def place_clusters(tape, s, target, worlds):
         uy = uy + dy
         uz = uz + dz
         lx, ly, lz = _moment(tape, s, at, target, tape[H_START], ux, uy, uz)
-        x, y, z, root = _turn(tape, s, at, half * lx, half * ly, half * lz, worlds)
+        x, y, z, root = turn(tape, s, at, half * lx, half * ly, half * lz, worlds)
         # R - 1 = 2 (q0 [q] + q q^T - q.q).
         square = zero - dot(x, y, z, x, y, z)
         d00 = two * fma(x, x, square)
@@ -410,10 +314,10 @@ def place_clusters(tape, s, target, worlds):
         d12 = two * fma(y, z, zero - root * x)
         d21 = two * fma(y, z, root * x)
         cx, cy, cz = load_vector(s, work + CENTRE)
-        rider = at + HEAD + tape[at]
+        rider = at + CLUSTER_HEAD + tape[at]
         for k in range(tape[at] + tape[at + 1]):
             if k < tape[at]:
-                p = tape[at + HEAD + k]
+                p = tape[at + CLUSTER_HEAD + k]
                 m = load(s, tape[at + 3] + k)
                 rx, ry, rz = load_vector(s, work + ARMS + 3 * k)
                 mx = ux
@@ -453,7 +357,7 @@ def move_clusters(tape, s, target):
         work = tape[at + 7]
         cx, cy, cz = _mean(tape, s, at, target, -1)
         inverse = load(s, tape[at + 5] + 1)
-        rider = at + HEAD + tape[at]
+        rider = at + CLUSTER_HEAD + tape[at]
         for k in range(tape[at + 1]):
             share = zero - load(s, tape[at + 4] + k) * inverse
             x, y, z = _mean_arm(tape, s, rider, tape[rider + 3])
@@ -467,8 +371,8 @@ def move_clusters(tape, s, target):
         for k in range(tape[at]):
             rx, ry, rz = load_vector(s, work + ARMS + 3 * k)
             vx, vy, vz = cross(wx, wy, wz, rx, ry, rz)
-            store_vector(s, target + tape[at + HEAD + k], cx + vx, cy + vy, cz + vz)
-        rider = at + HEAD + tape[at]
+            store_vector(s, target + tape[at + CLUSTER_HEAD + k], cx + vx, cy + vy, cz + vz)
+        rider = at + CLUSTER_HEAD + tape[at]
         for _ in range(tape[at + 1]):
             own = tape[rider + 4]
             rx, ry, rz = load_vector(s, own + ARM)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..model.compile import PARTICLES
+from ..model.parameters import PARTICLES
 
 if TYPE_CHECKING:
     from ..world import World

@@ -15,6 +15,8 @@ import numpy as np
 from ..scene.forces import StiffSpring
 from ..scene.rider import Rider
 from . import sparsity
+from .parameters import PARTICLES
+from .tape import ARMS, INVERSE, LOAD_ROWS
 
 if TYPE_CHECKING:
     from .compile import Compiler
@@ -217,22 +219,22 @@ class Clusters:
         points = self._points(members)
         ends = np.array([pair for _, pair in rods])
         moved = members + [c.of(rider.particle) for rider in riders]
-        keys = [("particles", "inverse_mass")] + [(rod, "length") for rod, _ in rods]
+        keys = [(PARTICLES, "inverse_mass")] + [(rod, "length") for rod, _ in rods]
 
         def frame(inverse_mass: np.ndarray, *lengths: np.ndarray) -> np.ndarray:
             return rigid_frame(points, ends, corners, inverse_mass[moved], *lengths)
 
         given = c.slot(4 * count + len(riders) + 8, tuple(keys), frame)
         total = given + 4 * count + len(riders)
-        work = c.take(21 + 3 * count)
-        self.arms |= {p: work + 21 + 3 * k for k, p in enumerate(members)}
-        self.inverses.append((total + 1, work + 6))
+        work = c.take(ARMS + 3 * count)
+        self.arms |= {p: work + ARMS + 3 * k for k, p in enumerate(members)}
+        self.inverses.append((total + 1, work + INVERSE))
         record = [
             count, len(riders), given, given + 3 * count, given + 4 * count, total, total + 2, work,
             *(3 * members[k] for k in corners), *(3 * p for p in members),
         ]  # fmt: skip
         for rider in riders:
-            load, own = c.of(rider.particle), c.take(12)
+            load, own = c.of(rider.particle), c.take(LOAD_ROWS)
             record += [
                 3 * load, c.held[id(rider)], c.place(rider, "weights"), c.place(rider, "rates"), own,
                 len(rider.deck), *(self.arms[c.of(p)] for p in rider.deck),

@@ -10,32 +10,21 @@ import numpy as np
 from ..methods import Method
 from ..scene.contacts import (
     ContactGenerator,
-    Ground,
-    LinePlatform,
-    check_span,
-    check_thickness,
 )
 from ..scene.forces import (
-    AnchoredBungee,
-    AnchoredSpring,
-    Bungee,
-    Buoyancy,
-    Drag,
-    Gravity,
-    Spring,
     StiffSpring,
     UserForce,
 )
-from ..scene.links import Cable, CableConstraint, RodConstraint
+from ..scene.links import Cable, CableConstraint
 from ..scene.particle import Particle
 from ..scene.rider import Rider
 from ..scene.scene import CONTACTS, LINKS, Scene
 from . import derived, tape
+from .constraints import add_contacts, add_links, add_riders
+from .forces import add_forces
 from .network import Network
-from .parameters import Key, Parameters, Slot
-from .tape import CONTACT, GROUND, HEADER, LINE, LINK, USER
-
-PARTICLES = "particles"
+from .parameters import PARTICLES, Key, Parameters, Slot
+from .tape import CONTACT, HEADER, LINK
 
 #: Header fields that are -1, not an empty section, where a scene has no such rows.
 _ABSENT = ("user_forces", "force", "start", "free", "impulse", "dense")
@@ -95,6 +84,8 @@ class Compiler:
         }  # fmt: skip
         self.next_row = 0
         self.start: list[float] = []
+        #: First row of minus the weights at the step's start, by rider.
+        self.held: dict[int, int] = {}
         direct = method.solver is not None and method.solver.code == tape.DIRECT
         self.network = Network(self) if direct else None
         if self.network is not None:
@@ -184,10 +175,10 @@ class Compiler:
         self.one = self.constant(1.0)
         self.minus_one = self.constant(-1.0)
         self._particles()
-        self._forces()
-        self._links()
-        self._riders()
-        self._contacts()
+        add_forces(self)
+        add_links(self)
+        add_riders(self)
+        add_contacts(self)
         self._method()
         self._network()
         self._write()
@@ -279,273 +270,9 @@ class Compiler:
         self.sections["drift"] = [p for p, x in enumerate(self.particles) if id(x) not in stiff]
         self.header["dt"] = self.constant(method.dt)
 
-    def _forces(self) -> None:
-        """Force rows and a record per force."""
-        scene = self.scene
-        drags = scene.of(Drag)
-        explicit = self.method.integrator.code == tape.EXPLICIT_EULER
-        summed = scene.of(
-            Spring, Bungee, AnchoredSpring, AnchoredBungee, Gravity, Buoyancy, UserForce
-        ) or (drags and explicit)
-        self.header["forced"] = int(bool(summed))
-        force = self.take(3 * len(self.particles) + 3) if summed else -1
-        self.header["force"] = force
-        spare = force + 3 * len(self.particles)
-        springs: list[int] = []
-        for spring in scene.of(Spring, Bungee, AnchoredSpring, AnchoredBungee):
-            stiffness = self.parameter(spring, "stiffness", spring.stiffness)
-            rest = self.parameter(spring, "rest_length", spring.rest_length)
-            if isinstance(spring, AnchoredSpring):
-                a, b = spring.particle, self.parameter(spring, "anchor", spring.anchor)
-                end = spare
-            else:
-                a, b, end = spring.a, self.at("position", spring.b), self.at("force", spring.b)
-            single = int(isinstance(spring, Bungee | AnchoredBungee))
-            springs += [
-                self.at("position", a),
-                b,
-                self.at("force", a),
-                end,
-                stiffness,
-                rest,
-                single,
-            ]
-        self.sections["springs"] = springs
-        self.sections["gravities"] = []
-        gravities = scene.of(Gravity)
-        if gravities:
-
-            def mass(inverse: np.ndarray) -> np.ndarray:
-                return np.where(inverse > 0.0, 1.0 / np.where(inverse > 0.0, inverse, 1.0), 0.0)
-
-            masses = self.slot(len(self.particles), ((PARTICLES, "inverse_mass"),), mass)
-            for gravity in gravities:
-                g = self.parameter(gravity, "acceleration", gravity.acceleration)
-                for p in self.some(gravity.particles):
-                    self.sections["gravities"] += [self.at("force", p), masses + self.of(p), g]
-        self.sections["buoyancies"] = []
-        for float_ in scene.of(Buoyancy):
-            names = ("volume", "density", "gravity")
-            for name in names:
-                self.parameters.declare((float_, name), getattr(float_, name))
-            surface = self.parameter(float_, "surface", float_.surface)
-            half = self.parameter(float_, "half_depth", float_.half_depth)
-            lift = self.slot(1, tuple((float_, name) for name in names), lambda v, r, g: v * r * g)
-            p = float_.particle
-            y, f = self.at("position", p) + 1, self.at("force", p) + 1
-            self.sections["buoyancies"] += [y, f, surface, half, lift]
-        share = self.method.integrator.damping_share * self.method.dt
-        self.sections["drags"] = []
-        for drag in drags:
-            linear = self.parameter(drag, "linear", drag.linear)
-            quadratic = self.parameter(drag, "quadratic", drag.quadratic)
-            wind = self.parameter(drag, "wind", drag.wind)
-            for p in self.some(drag.particles):
-                if p.movable:
-                    index = self.of(p)
-                    flow = self.slot(
-                        2,
-                        ((drag, "linear"), (PARTICLES, "inverse_mass")),
-                        lambda k1, inverse, i=index: derived.drag(k1, inverse[i : i + 1], share)[
-                            :, 0
-                        ],
-                    )
-                    f = self.at("force", p) if force >= 0 else -1
-                    self.sections["drags"] += [
-                        self.at("velocity", p), f, linear, quadratic, wind, flow, flow + 1,
-                    ]  # fmt: skip
-        self.sections["stiff_springs"] = []
-        for stiff in scene.of(StiffSpring):
-            if stiff.particle.movable:
-                self._stiff_spring(stiff)
-            else:
-                for name in ("anchor", "stiffness", "damping"):
-                    self.parameters.declare((stiff, name), getattr(stiff, name))
-
     def some(self, chosen: Any) -> list[Particle]:
         """The chosen particles, or all."""
         return self.particles if chosen is None else list(chosen)
-
-    def _stiff_spring(self, spring: StiffSpring) -> None:
-        i = self.of(spring.particle)
-        dt = self.method.dt
-        anchor = self.parameter(spring, "anchor", spring.anchor)
-        self.parameters.declare((spring, "stiffness"), spring.stiffness)
-        self.parameters.declare((spring, "damping"), spring.damping)
-        mass = (PARTICLES, "inverse_mass")
-        p = self.slot(
-            4,
-            ((spring, "stiffness"), (spring, "damping"), mass),
-            lambda k, c, inverse: derived.oscillator(k, c, inverse[i : i + 1], dt)[:, 0],
-        )
-        give = self.slot(
-            1, ((spring, "stiffness"), mass), lambda k, inverse: 1 / (k * inverse[i : i + 1])
-        )
-        f = self.at("force", spring.particle) if self.header["force"] >= 0 else -1
-        self.sections["stiff_springs"] += [
-            self.at("position", spring.particle),
-            self.at("velocity", spring.particle),
-            self.at("acceleration", spring.particle),
-            f,
-            self.header["inverse_mass"] + i,
-            p,
-            anchor,
-            give,
-        ]
-
-    def _links(self) -> None:
-        """Work rows of constrained particles and a record per link."""
-        count = len(self.particles)
-        constrained = bool(self.links or self.implied or self.scene.of(Rider) or self.contacts)
-        self.header["constrained"] = int(constrained)
-        staged = constrained and self.method.solver is not None and self.method.solver.staged
-        for name in ("start", "free"):
-            self.header[name] = self.take(3 * count) if constrained else -1
-        self.header["impulse"] = self.take(3 * count + 3) if staged else -1
-        spare = self.header["impulse"] + 3 * count
-        records: list[int] = []
-        winches: list[int] = []
-        for link in self.links:
-            cable = self.is_cable(link)
-            length = link.max_length if cable else link.length
-            winch = getattr(link, "winch", False)
-            if winch:
-                length_row = self.place(link, "length")
-                rate_row = self.place(link, "rate")
-                gain_row = self.place(link, "acceleration")
-                winches += [length_row, rate_row, gain_row]
-            else:
-                length_row = self.parameter(link, "length", length)
-                rate_row = gain_row = self.zero
-            restitution = (
-                self.parameter(link, "restitution", link.restitution) if cable else self.zero
-            )
-            if isinstance(link, RodConstraint | CableConstraint):
-                a = link.particle
-                anchor = self.parameter(link, "anchor", link.anchor)
-                b = (anchor, self.zero, spare, self.zero)
-            else:
-                a = link.a
-                other = link.b
-                b = (
-                    self.at("position", other),
-                    self.at("velocity", other),
-                    self.at("impulse", other),
-                    self.header["inverse_mass"] + self.of(other),
-                )
-            work = self.take(7) if staged else -1
-            records += [
-                self.at("position", a), b[0], self.at("velocity", a), b[1], self.at("impulse", a), b[2],
-                self.header["inverse_mass"] + self.of(a), b[3], length_row, rate_row, int(cable), restitution,
-                self.place(link, "multiplier") if staged else -1, work, work + 3, -1, gain_row,
-            ]  # fmt: skip
-        for rod in self.implied:
-            self.parameters.declare((rod, "length"), rod.length)
-            if isinstance(rod, RodConstraint):
-                self.parameters.declare((rod, "anchor"), rod.anchor)
-        self.sections["links"] = records
-        self.sections["winches"] = winches
-        self.header["cables"] = sum(map(self.is_cable, self.links))
-
-    def _riders(self) -> None:
-        """How weights move, of every rider; and a record per rider with rows of its own."""
-        self.held = {id(rider): self.take(len(rider.deck) + 6) for rider in self.scene.of(Rider)}
-        movers: list[int] = []
-        for rider in self.scene.of(Rider):
-            movers += [
-                len(rider.deck), self.place(rider, "weights"), self.place(rider, "rates"),
-                self.place(rider, "accelerations"), self.held[id(rider)],
-            ]  # fmt: skip
-        self.sections["movers"] = movers
-        records: list[int] = []
-        for rider in self.riders:
-            load = rider.particle
-            records += [
-                self.at("position", load), self.at("velocity", load), self.at("impulse", load),
-                self.place(rider, "multiplier"), -1, self.header["inverse_mass"] + self.of(load),
-                len(rider.deck), self.place(rider, "weights"), self.place(rider, "rates"), self.held[id(rider)],
-            ]  # fmt: skip
-            for p in rider.deck:
-                records += [
-                    self.at("position", p),
-                    self.at("velocity", p),
-                    self.at("impulse", p),
-                    self.header["inverse_mass"] + self.of(p),
-                ]
-        self.sections["riders"] = records
-        self.counts["riders"] = len(self.riders)
-
-    def _contacts(self) -> None:
-        """A record per pair that can touch."""
-        records: list[int] = []
-        surfaces: dict[int, tuple[int, int, int]] = {}
-        staged = self.method.solver is not None and self.method.solver.staged
-        radii: dict[int, int] = {}
-        for generator, a, b, k in self.contacts:
-            if id(generator) not in surfaces:
-                restitution = self.parameter(generator, "restitution", generator.restitution)
-                friction = self.parameter(generator, "friction", generator.friction)
-                surfaces[id(generator)] = (self._surface(generator), restitution, friction)
-            place, restitution, friction = surfaces[id(generator)]
-            kind = GROUND if isinstance(generator, Ground) else LINE
-            if isinstance(generator, ContactGenerator):
-                kind, place = USER, self.place(generator, f"pair {k}")
-            if id(a) not in radii:
-                index = self.of(a)
-                radii[id(a)] = self.slot(
-                    1, ((PARTICLES, "radius"),), lambda value, i=index: value[i : i + 1]
-                )
-            spare = self.header["impulse"] + 3 * len(self.particles)
-            z = self.zero
-            other = (
-                (z, z, spare, z, z, z)
-                if b is None
-                else (
-                    self.at("position", b),
-                    self.at("velocity", b),
-                    self.at("impulse", b),
-                    self.header["inverse_mass"] + self.of(b),
-                    self.at("acceleration", b),
-                    self.at("start", b),
-                )
-            )
-            records += [
-                kind, self.at("position", a), other[0], self.at("velocity", a), other[1],
-                self.at("impulse", a), other[2], self.header["inverse_mass"] + self.of(a), other[3],
-                self.at("acceleration", a), other[4], place, radii[id(a)], restitution, friction,
-                self.place(generator, f"multiplier {k}") if staged else -1, self.take(9), self.take(1),
-                self.take(7) if staged else -1, -1, len(records) // CONTACT, self.at("start", a), other[5],
-                self.take(6) if staged else -1,
-            ]  # fmt: skip
-        self.sections["contacts"] = records
-        self.model.contacts_most = len(self.links) + len(self.contacts)
-        self.model.blocks = len(self.contacts)
-
-    def _surface(self, generator: Any) -> int:
-        """Geometry rows of scenery."""
-        if isinstance(generator, Ground):
-            normal = self.parameter(generator, "normal", generator.normal)
-            height = self.parameter(generator, "height", generator.height)
-            assert height == normal + 3
-            return normal
-        if isinstance(generator, LinePlatform):
-            declared = self.parameters
-            particles = [a for other, a, _, _ in self.contacts if other is generator]
-
-            def check_start(given: np.ndarray) -> None:
-                check_span(given, declared.values[generator, "end"])
-
-            def check_end(given: np.ndarray) -> None:
-                check_span(declared.values[generator, "start"], given)
-
-            def check_radius(given: np.ndarray) -> None:
-                check_thickness(float(given.min()), particles)
-
-            start = self.parameter(generator, "start", generator.start, check=check_start)
-            self.parameter(generator, "end", generator.end, check=check_end)
-            self.parameter(generator, "radius", generator.radius, check=check_radius)
-            return start
-        return -1
 
     def _method(self) -> None:
         """Codes and settings of the method, and the generators in the order they were added."""

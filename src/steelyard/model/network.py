@@ -9,6 +9,7 @@ import numpy as np
 from ..scene.links import RodConstraint
 from . import sparsity
 from .clusters import Clusters
+from .elimination import add_contact_system, add_elimination, lower
 from .tape import CONTACT, LINK
 
 if TYPE_CHECKING:
@@ -16,16 +17,8 @@ if TYPE_CHECKING:
 
 _DIAGONAL = (0, 2, 5)
 
-#: Up to so many contacts per world Newton's method on the friction law is worth its dense system.
-DENSE_CONTACTS = 8
-
 # A movable particle of a block row: index, row of its coefficient, row of its inverse mass.
 Node = tuple[int, int, int]
-
-
-def _lower(row: int, column: int) -> int:
-    """Place of an entry of a symmetric block among its six rows."""
-    return row * (row + 1) // 2 + column
 
 
 class Network:
@@ -42,8 +35,8 @@ class Network:
         self._rows()
         self._assembly()
         self._masks()
-        self._elimination()
-        self._contact_system()
+        add_elimination(self)
+        add_contact_system(self)
         self.c.model.blocks = self.count
 
     # Blocks and rows
@@ -285,7 +278,7 @@ class Network:
         i, j = self.place[slot // 3], self.place[other // 3]
         r, s = slot % 3, other % 3
         if i == j:
-            return self.diagonal[i] + _lower(max(r, s), min(r, s)), True
+            return self.diagonal[i] + lower(max(r, s), min(r, s)), True
         if i < j:
             i, j, r, s = j, i, s, r
         return self.a[i, j] + 3 * r + s, False
@@ -316,7 +309,7 @@ class Network:
                 for column in range(row):
                     if {slot, 3 * block + column} & cables:
                         masks += [
-                            diagonal + _lower(row, column),
+                            diagonal + lower(row, column),
                             mask + slot,
                             mask + 3 * block + column,
                         ]
@@ -332,115 +325,3 @@ class Network:
         c.sections["link_masks"] = masks
         c.sections["padding"] = padding
         c.sections["references"] = references
-
-    # Elimination
-
-    def _elimination(self) -> None:
-        c = self.c
-        right = c.header["right"]
-        factor: list[int] = []
-        forward: list[int] = []
-        backward: list[int] = []
-        for i, block in enumerate(self.order):
-            contact = i >= self.structural
-            columns = self.pattern[i]
-            factor += [
-                self.diagonal[i],
-                -1 if contact else self.inverse[i],
-                self.reference[i],
-                block,
-            ]
-            factor.append(len(columns))
-            for j in columns:
-                shared = [k for k in self.pattern[j] if k in set(columns) and k < self.structural]
-                outer = j >= self.structural
-                factor += [
-                    self.a[i, j],
-                    -1 if outer else self.p[i, j],
-                    -1 if outer else self.inverse[j],
-                    self.order[j],
-                    len(shared),
-                ]
-                for k in shared:
-                    factor += [self.a[i, k], self.p[j, k], self.order[k]]
-            inner = [j for j in columns if j < self.structural]
-            forward += [right + 3 * block, block, len(inner)]
-            for j in inner:
-                forward += [self.p[i, j], right + 3 * self.order[j], self.order[j]]
-        for i in reversed(range(self.structural)):
-            later = [k for k in range(i + 1, self.count) if i in self.pattern[k]]
-            block = self.order[i]
-            backward += [right + 3 * block, self.inverse[i], block, len(later)]
-            for k in later:
-                backward += [self.p[k, i], right + 3 * self.order[k], self.order[k]]
-        c.sections |= {"factor": factor, "forward": forward, "backward": backward}
-        c.counts |= {"factor": self.count, "forward": self.count, "backward": self.structural}
-
-    def _contact_system(self) -> None:
-        """Copy of W for the solve in which loaded contacts stick, and W's rows by contact."""
-        c = self.c
-        first = self.structural
-        guess, mask = c.header["guess"], c.header["mask"]
-        outer = range(first, self.count)
-        diagonal = {i: c.take(6) for i in outer}
-        inverse = {i: c.take(6) for i in outer}
-        pairs = [(i, j) for i in outer for j in self.pattern[i] if j >= first]
-        v = {pair: c.take(9) for pair in pairs}
-        p = {pair: c.take(9) for pair in pairs}
-        copies: list[int] = []
-        factor: list[int] = []
-        forward: list[int] = []
-        backward: list[int] = []
-        for i in outer:
-            slot = mask + 3 * self.order[i]
-            for row in range(3):
-                for column in range(row + 1):
-                    entry = _lower(row, column)
-                    reference = self.reference[i] + row if row == column else -1
-                    copies += [
-                        diagonal[i] + entry,
-                        self.diagonal[i] + entry,
-                        slot + row,
-                        slot + column,
-                    ]
-                    copies.append(reference)
-            columns = [j for j in self.pattern[i] if j >= first]
-            factor += [diagonal[i], inverse[i], self.reference[i], self.order[i], len(columns)]
-            forward += [guess + 3 * self.order[i], self.order[i], len(columns)]
-            for j in columns:
-                other = mask + 3 * self.order[j]
-                for row in range(3):
-                    for column in range(3):
-                        entry = 3 * row + column
-                        rows = [slot + row, other + column]
-                        copies += [v[i, j] + entry, self.a[i, j] + entry, *rows, -1]
-                shared = [k for k in self.pattern[j] if k >= first and k in set(columns)]
-                factor += [v[i, j], p[i, j], inverse[j], self.order[j], len(shared)]
-                for k in shared:
-                    factor += [v[i, k], p[j, k], self.order[k]]
-                forward += [p[i, j], guess + 3 * self.order[j], self.order[j]]
-        for i in reversed(outer):
-            later = [k for k in range(i + 1, self.count) if i in self.pattern[k]]
-            backward += [guess + 3 * self.order[i], inverse[i], self.order[i], len(later)]
-            for k in later:
-                backward += [p[k, i], guess + 3 * self.order[k], self.order[k]]
-        products: list[int] = []
-        for block in range(first, self.count):
-            i = self.place[block]
-            others = [(self.a[i, j], j, 0) for j in self.pattern[i] if j >= first]
-            others += [
-                (self.a[k, i], k, 1) for k in range(i + 1, self.count) if i in self.pattern[k]
-            ]
-            products += [3 * block, self.diagonal[i], block, self.reference[i], len(others)]
-            for entry, k, transposed in others:
-                products += [entry, 3 * self.order[k], transposed, self.order[k]]
-        size = self.count - first
-        c.header["dense"] = c.take(3 * size * (3 * size + 1)) if size <= DENSE_CONTACTS else -1
-        c.sections |= {
-            "contact_copies": copies, "contact_factor": factor, "contact_forward": forward,
-            "contact_backward": backward, "contact_products": products,
-        }  # fmt: skip
-        c.counts |= {
-            "contact_factor": size, "contact_forward": size, "contact_backward": size,
-            "contact_products": size,
-        }  # fmt: skip

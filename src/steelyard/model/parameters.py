@@ -16,6 +16,9 @@ import numpy as np
 
 from ..math.lanes import LANES
 
+#: The thing under which all particles' state and parameters are kept.
+PARTICLES = "particles"
+
 Key = tuple[Any, str]
 
 

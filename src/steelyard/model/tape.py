@@ -81,6 +81,13 @@ HEADER = 65
 LINK = 17
 CONTACT = 24
 
+# Records of clusters and of loads on them: what comes before their lists of particles. Work rows of a cluster: inertia,
+# inverse of that with loads, quaternion, shift of the centre by loads, centre, arms; of a load: its arm, r0 and r1 of
+# the moment's equation, motion over the deck.
+CLUSTER_HEAD, LOAD_HEAD = 11, 6
+INERTIA, INVERSE, TURN, SHIFT, CENTRE, ARMS = 0, 6, 12, 15, 18, 21
+ARM, BEFORE, AFTER, MOTION, LOAD_ROWS = 0, 3, 6, 9, 12
+
 # Codes of integrators, solvers and contact geometries.
 EXPLICIT_EULER, SYMPLECTIC_EULER, RATTLE, CLOSED_FORM = range(4)
 NO_SOLVER, WORST_FIRST, GAUSS_SEIDEL, DIRECT = range(4)

@@ -1,0 +1,132 @@
+"""Forces compiled to rows and records."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..scene.forces import (
+    AnchoredBungee,
+    AnchoredSpring,
+    Bungee,
+    Buoyancy,
+    Drag,
+    Gravity,
+    Spring,
+    StiffSpring,
+    UserForce,
+)
+from . import derived, tape
+from .parameters import PARTICLES
+
+if TYPE_CHECKING:
+    from .compile import Compiler
+
+
+def add_forces(c: Compiler) -> None:
+    """Force rows and a record per force."""
+    scene = c.scene
+    drags = scene.of(Drag)
+    explicit = c.method.integrator.code == tape.EXPLICIT_EULER
+    summed = scene.of(
+        Spring, Bungee, AnchoredSpring, AnchoredBungee, Gravity, Buoyancy, UserForce
+    ) or (drags and explicit)
+    c.header["forced"] = int(bool(summed))
+    force = c.take(3 * len(c.particles) + 3) if summed else -1
+    c.header["force"] = force
+    spare = force + 3 * len(c.particles)
+    springs: list[int] = []
+    for spring in scene.of(Spring, Bungee, AnchoredSpring, AnchoredBungee):
+        stiffness = c.parameter(spring, "stiffness", spring.stiffness)
+        rest = c.parameter(spring, "rest_length", spring.rest_length)
+        if isinstance(spring, AnchoredSpring):
+            a, b = spring.particle, c.parameter(spring, "anchor", spring.anchor)
+            end = spare
+        else:
+            a, b, end = spring.a, c.at("position", spring.b), c.at("force", spring.b)
+        single = int(isinstance(spring, Bungee | AnchoredBungee))
+        springs += [
+            c.at("position", a),
+            b,
+            c.at("force", a),
+            end,
+            stiffness,
+            rest,
+            single,
+        ]
+    c.sections["springs"] = springs
+    c.sections["gravities"] = []
+    gravities = scene.of(Gravity)
+    if gravities:
+
+        def mass(inverse: np.ndarray) -> np.ndarray:
+            return np.where(inverse > 0.0, 1.0 / np.where(inverse > 0.0, inverse, 1.0), 0.0)
+
+        masses = c.slot(len(c.particles), ((PARTICLES, "inverse_mass"),), mass)
+        for gravity in gravities:
+            g = c.parameter(gravity, "acceleration", gravity.acceleration)
+            for p in c.some(gravity.particles):
+                c.sections["gravities"] += [c.at("force", p), masses + c.of(p), g]
+    c.sections["buoyancies"] = []
+    for float_ in scene.of(Buoyancy):
+        names = ("volume", "density", "gravity")
+        for name in names:
+            c.parameters.declare((float_, name), getattr(float_, name))
+        surface = c.parameter(float_, "surface", float_.surface)
+        half = c.parameter(float_, "half_depth", float_.half_depth)
+        lift = c.slot(1, tuple((float_, name) for name in names), lambda v, r, g: v * r * g)
+        p = float_.particle
+        y, f = c.at("position", p) + 1, c.at("force", p) + 1
+        c.sections["buoyancies"] += [y, f, surface, half, lift]
+    share = c.method.integrator.damping_share * c.method.dt
+    c.sections["drags"] = []
+    for drag in drags:
+        linear = c.parameter(drag, "linear", drag.linear)
+        quadratic = c.parameter(drag, "quadratic", drag.quadratic)
+        wind = c.parameter(drag, "wind", drag.wind)
+        for p in c.some(drag.particles):
+            if p.movable:
+                index = c.of(p)
+                flow = c.slot(
+                    2,
+                    ((drag, "linear"), (PARTICLES, "inverse_mass")),
+                    lambda k1, inverse, i=index: derived.drag(k1, inverse[i : i + 1], share)[:, 0],
+                )
+                f = c.at("force", p) if force >= 0 else -1
+                c.sections["drags"] += [
+                    c.at("velocity", p), f, linear, quadratic, wind, flow, flow + 1,
+                ]  # fmt: skip
+    c.sections["stiff_springs"] = []
+    for stiff in scene.of(StiffSpring):
+        if stiff.particle.movable:
+            _stiff_spring(c, stiff)
+        else:
+            for name in ("anchor", "stiffness", "damping"):
+                c.parameters.declare((stiff, name), getattr(stiff, name))
+
+
+def _stiff_spring(c: Compiler, spring: StiffSpring) -> None:
+    i = c.of(spring.particle)
+    dt = c.method.dt
+    anchor = c.parameter(spring, "anchor", spring.anchor)
+    c.parameters.declare((spring, "stiffness"), spring.stiffness)
+    c.parameters.declare((spring, "damping"), spring.damping)
+    mass = (PARTICLES, "inverse_mass")
+    p = c.slot(
+        4,
+        ((spring, "stiffness"), (spring, "damping"), mass),
+        lambda k, c, inverse: derived.oscillator(k, c, inverse[i : i + 1], dt)[:, 0],
+    )
+    give = c.slot(1, ((spring, "stiffness"), mass), lambda k, inverse: 1 / (k * inverse[i : i + 1]))
+    f = c.at("force", spring.particle) if c.header["force"] >= 0 else -1
+    c.sections["stiff_springs"] += [
+        c.at("position", spring.particle),
+        c.at("velocity", spring.particle),
+        c.at("acceleration", spring.particle),
+        f,
+        c.header["inverse_mass"] + i,
+        p,
+        anchor,
+        give,
+    ]
