@@ -157,11 +157,12 @@ def _step(tape, s, skip, ends, values, dt, phase, fresh, hasty):
 
 
 @inner
-def _may_be_hasty(tape, substeps, phase):
-    """Whether worlds with slipping contacts are worth doing over, together: where few will be, in few steps."""
+def _may_be_hasty(tape, worlds, substeps, phase):
+    """Whether worlds with slipping contacts are worth doing over: in few steps, in which few worlds will, of many."""
     contacts = tape[tape[H_CONTACTS]]
     direct = tape[H_SOLVER] == DIRECT
-    return direct and contacts > 0 and substeps <= _HASTY_STEPS and phase == BOTH_HALVES
+    worth = worlds > LANES and substeps <= _HASTY_STEPS
+    return direct and contacts > 0 and phase == BOTH_HALVES and worth
 
 
 @kernel
@@ -199,7 +200,7 @@ def advance(
         else:
             count = min(worlds - LANES * block, LANES)
             whole = count == LANES
-            hasty = _may_be_hasty(tape, substeps, phase)
+            hasty = _may_be_hasty(tape, worlds, substeps, phase)
             for k in range(LANES):
                 picked[k] = LANES * block + min(k, count - 1)
             block += 1
