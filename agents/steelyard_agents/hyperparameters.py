@@ -10,8 +10,9 @@ A settings file maps environment ids to hyperparameters:
       learning_rate: lin_3e-4
       policy_kwargs: "dict(net_arch=[64, 64], activation_fn=nn.Tanh)"
 
-`n_timesteps`, `n_envs`, `normalize`, `env_kwargs`, `noise_type` and `noise_std` are read here; all
-other keys are arguments of the algorithm.
+`n_timesteps`, `n_envs`, `normalize`, `env_kwargs`, `noise_type` and `noise_std` are read here, and
+`deterministic` (true unless set), which says whether the trained policy acts by its most likely actions
+or by samples; all other keys are arguments of the algorithm.
 """
 
 import ast
@@ -53,6 +54,7 @@ class Hyperparameters:
         env_kwargs: Arguments of the environment.
         algorithm: Arguments of the algorithm, `policy` among them.
         noise: Kind and standard deviation of the action noise; None for none.
+        deterministic: Whether the trained policy takes its most likely actions or samples them.
         source: The settings as read, for the record; empty if there were none.
     """
 
@@ -62,6 +64,7 @@ class Hyperparameters:
     env_kwargs: dict[str, Any] = field(default_factory=dict)
     algorithm: dict[str, Any] = field(default_factory=dict)
     noise: tuple[str, float] | None = None
+    deterministic: bool = True
     source: dict[str, Any] = field(default_factory=dict)
 
     def action_noise(self, actions: int) -> ActionNoise | None:
@@ -106,13 +109,14 @@ def parse(algo: str, source: dict[str, Any]) -> Hyperparameters:
     normalize = _normalize(values.pop("normalize", False))
     env_kwargs = values.pop("env_kwargs", None) or {}
     noise = _noise(values.pop("noise_type", None), values.pop("noise_std", 0.0))
+    deterministic = bool(values.pop("deterministic", True))
     accepted = inspect.signature(ALGORITHMS[algo].__init__).parameters
     for key in values:
         if key not in accepted:
             raise ValueError(
                 f"unknown setting {key!r} for {algo}: neither a setting of training "
-                "(n_timesteps, n_envs, normalize, env_kwargs, noise_type, noise_std) nor an "
-                f"argument of {algo.upper()}"
+                "(n_timesteps, n_envs, normalize, env_kwargs, noise_type, noise_std, deterministic) "
+                f"nor an argument of {algo.upper()}"
             )
     if normalize is not None:
         # Normalised rewards are scaled by the discounted return, with the algorithm's discount.
@@ -126,6 +130,7 @@ def parse(algo: str, source: dict[str, Any]) -> Hyperparameters:
         env_kwargs=dict(env_kwargs),
         algorithm=algorithm,
         noise=noise,
+        deterministic=deterministic,
         source=dict(source),
     )
 

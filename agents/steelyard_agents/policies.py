@@ -10,6 +10,7 @@ from typing import Any, Protocol
 
 import gymnasium as gym
 import numpy as np
+import yaml
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.vec_env import VecNormalize
 
@@ -49,36 +50,50 @@ class RandomPolicy:
 
 
 class TrainedPolicy:
-    """A trained model's most likely actions, with the normaliser that it was trained with.
+    """A trained model's actions, with the normaliser that it was trained with.
 
     Args:
         model: The trained model.
         normalizer: The statistics to normalise observations with; None for none.
+        deterministic: Take the most likely actions; False to sample them, the same ones after each
+            `reset`.
     """
 
-    def __init__(self, model: BaseAlgorithm, normalizer: VecNormalize | None) -> None:
+    def __init__(
+        self,
+        model: BaseAlgorithm,
+        normalizer: VecNormalize | None,
+        *,
+        deterministic: bool = True,
+    ) -> None:
         self._model = model
         self._normalizer = normalizer
+        self._deterministic = deterministic
 
     @classmethod
-    def load(cls, run: Path, *, algo: str) -> "TrainedPolicy":
-        """Load what `train` saved in the folder `run`."""
+    def load(cls, run: Path, *, algo: str, deterministic: bool | None = None) -> "TrainedPolicy":
+        """Load what `train` saved in the folder `run`; by default it acts as its settings say."""
+        if deterministic is None:
+            (source,) = yaml.safe_load((run / "settings.yml").read_text()).values()
+            deterministic = bool(source.get("deterministic", True))
         model = ALGORITHMS[algo].load(run / "model.zip", device="cpu")
         path = run / "vecnormalize.pkl"
         if not path.exists():
-            return cls(model, None)
+            return cls(model, None, deterministic=deterministic)
         # VecNormalize.load would tie the statistics to one vector environment.
         with path.open("rb") as file:
-            return cls(model, pickle.load(file))
+            return cls(model, pickle.load(file), deterministic=deterministic)
 
     def reset(self, num_envs: int) -> None:
-        """Do nothing: the model remembers nothing between steps."""
+        """Forget the random numbers drawn so far; the model itself remembers nothing."""
+        if not self._deterministic:
+            self._model.set_random_seed(0)
 
     def __call__(self, obs: Any) -> np.ndarray:
         """Return an action per row."""
         if self._normalizer is not None:
             obs = self._normalizer.normalize_obs(obs)
-        return self._model.predict(obs, deterministic=True)[0]
+        return self._model.predict(obs, deterministic=self._deterministic)[0]
 
 
 def load_controller(env_id: str) -> Policy | None:

@@ -13,9 +13,10 @@ from rich.table import Table
 
 from steelyard_agents import hyperparameters
 from steelyard_agents.arguments import add_env_kwargs, parse_env_kwargs
-from steelyard_agents.evaluate import SEED, baselines
+from steelyard_agents.evaluate import SEED, baselines, evaluate
+from steelyard_agents.policies import TrainedPolicy
 from steelyard_agents.provenance import provenance, write_json
-from steelyard_agents.runs import env_folder, file_name
+from steelyard_agents.runs import env_folder, file_name, read_run
 from steelyard_agents.scores import bootstrap_interval, interquartile_mean
 from steelyard_agents.train import configured, train
 
@@ -44,6 +45,16 @@ def aggregate(runs: Sequence[dict[str, Any]], references: dict[str, Any]) -> dic
         "ratio_interval": ratios[1:] if ratios else None,
         "interval": f"{CONFIDENCE:.0%} stratified bootstrap over seeds, {RESAMPLES} resamples",
     }
+
+
+def rescored(
+    folder: Path, env_id: str, settings: hyperparameters.Hyperparameters
+) -> dict[str, Any]:
+    """Return the record of a run that has been trained, its score measured again."""
+    run = read_run(folder)
+    policy = TrainedPolicy.load(folder, algo=run["algo"], deterministic=settings.deterministic)
+    run["scores"]["trained"] = evaluate(policy, env_id, env_kwargs=settings.env_kwargs).summary()
+    return run
 
 
 def seed_table(title: str, record: dict[str, Any]) -> Table:
@@ -82,6 +93,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--settings", type=Path, help="YAML file as in rl-baselines3-zoo")
     add_env_kwargs(parser)
     parser.add_argument("--output", type=Path, help="default: agents/results/ENV-ALGO.json")
+    parser.add_argument(
+        "--rescore",
+        action="store_true",
+        help="train nothing: score the models that an earlier sweep left in runs",
+    )
     parser.add_argument("--no-progress", action="store_true", help="show no progress bar")
     options = parser.parse_args(arguments)
     if options.seeds < 1:
@@ -100,18 +116,22 @@ def main(arguments: Sequence[str] | None = None) -> None:
         references = baselines(options.env, env_kwargs=settings.env_kwargs)
         runs = []
         for seed in range(options.first_seed, options.first_seed + options.seeds):
-            _, run = train(
-                options.env,
-                settings,
-                algo=options.algo,
-                seed=seed,
-                folder=env_folder(options.env) / f"{options.algo}-seed{seed}",
-                origin=origin,
-                references=references,
-                progress=not options.no_progress,
-                console=console,
-            )
-            kept = ("seed", "timesteps", "wall_time_s", "steps_per_second")
+            folder = env_folder(options.env) / f"{options.algo}-seed{seed}"
+            if options.rescore:
+                run = rescored(folder, options.env, settings)
+            else:
+                _, run = train(
+                    options.env,
+                    settings,
+                    algo=options.algo,
+                    seed=seed,
+                    folder=folder,
+                    origin=origin,
+                    references=references,
+                    progress=not options.no_progress,
+                    console=console,
+                )
+            kept = ("seed", "timesteps", "wall_time_s", "steps_per_second", "commit")
             runs.append({key: run[key] for key in kept} | {"score": run["scores"]["trained"]})
     except (ValueError, gym.error.Error) as error:
         parser.error(str(error))

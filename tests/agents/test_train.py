@@ -121,6 +121,26 @@ def test_the_same_seed_gives_the_same_agent_and_another_seed_another(here):
     assert (actions[0] != actions[2]).any()
 
 
+def test_a_policy_can_act_by_samples_and_draws_the_same_again(here):
+    settings = here / "settings.yml"
+    settings.write_text(settings.read_text() + "  deterministic: false\n")
+    run()
+    folder = here / "runs/SteelyardTest-Point-v0/ppo-seed0"
+    obs = np.linspace(-0.9, 0.9, 7, dtype=np.float32)[:, None]
+    sampled = TrainedPolicy.load(folder, algo="ppo")
+    actions = []
+    for _ in range(2):
+        sampled.reset(7)
+        actions.append([sampled(obs), sampled(obs)])
+    np.testing.assert_array_equal(actions[0], actions[1])
+    assert (actions[0][0] != actions[0][1]).any()
+    likely = TrainedPolicy.load(folder, algo="ppo", deterministic=True)
+    np.testing.assert_array_equal(likely(obs), likely(obs))
+    evaluate.main([str(folder)])
+    again = json.loads((folder / "evaluation.json").read_text())
+    assert again["score"] == json.loads((folder / "results.json").read_text())["scores"]["trained"]
+
+
 def test_no_run_is_overwritten(here):
     for _ in range(3):
         run("--timesteps", "320", "--output", "here")
@@ -163,6 +183,15 @@ def test_training_learns(here):
     scores = json.loads((here / "learnt/results.json").read_text())["scores"]
     assert scores["trained"]["success_rate"] == 1.0
     assert scores["trained"]["return_mean"] > 0.9 * scores["controller"]["return_mean"]
+
+
+def test_a_sweep_can_be_scored_again(here):
+    arguments = [toy_envs.POINT_ID, "--settings", "settings.yml", "--seeds", "2", "--no-progress"]
+    sweep.main([*arguments, "--output", "first.json"])
+    sweep.main([*arguments, "--output", "again.json", "--rescore"])
+    first, again = (json.loads((here / name).read_text()) for name in ("first.json", "again.json"))
+    assert again["runs"] == first["runs"]
+    assert again["aggregate"] == first["aggregate"]
 
 
 def test_sweep(here, capsys):
