@@ -161,7 +161,8 @@ class BallisticTask(Task):
         """One control step of all worlds."""
         ended: int = kernels.step(
             actions, self._everyone, self.values, self.flight, self.settings, self.layout,
-            self.observations, self.rewards, self.flags, *self.world.launch, self.substeps,
+            self.observations, self.rewards, self.flags, self.world.state, self.world.given,
+            self.world.launch, self.substeps,
         )  # fmt: skip
         return ended
 

@@ -212,15 +212,12 @@ def _judge(values, flight, settings, layout, state, rewards, flags):
 @sy.kernel
 def step(
     actions, everyone, values, flight, settings, layout, observations, rewards, flags,
-    tape, s, skip, ends, work, state, given, given_rows, substeps,
+    state, given, launch, substeps,
 ):  # fmt: skip
     """A control step of all worlds: fire and turn, physics, outcome, observation, reward."""
     count = actions.shape[0]
     _control(actions, values, flight, settings, layout, state, given)
-    blocks = (count + 7) // 8
-    sy.advance(
-        tape, s, skip, ends, work, state, given, given_rows, 0, blocks, count, substeps, 3
-    )  # fmt: skip
+    sy.advance(launch, substeps)
     _follow(count, values, flight, settings, layout, state)
     observe(everyone, values, flight, settings, layout, state, observations)
     return _judge(values, flight, settings, layout, state, rewards, flags)

@@ -155,7 +155,7 @@ class BridgeTask(Task):
         """One control step of all worlds."""
         ended: int = kernels.step(
             actions, self._everyone, self.values, self.streams, self.settings, self.layout,
-            self.observations, self.rewards, self.flags, *self.world.launch, self.substeps,
+            self.observations, self.rewards, self.flags, self.world.state, self.world.launch, self.substeps,
         )  # fmt: skip
         return ended
 

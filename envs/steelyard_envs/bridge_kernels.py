@@ -320,7 +320,7 @@ def _judge(values, settings, layout, state, observations, rewards, flags):
 @sy.kernel
 def step(
     actions, everyone, values, streams, settings, layout, observations, rewards, flags,
-    tape, s, skip, ends, work, state, given, given_rows, substeps,
+    state, launch, substeps,
 ):  # fmt: skip
     """A control step of all worlds: control, physics, observation, reward."""
     count = actions.shape[0]
@@ -329,9 +329,7 @@ def step(
         blow(values, streams, settings, layout, state, w)
         _wind_winches(actions, values, settings, layout, state, w)
     for _ in range(substeps):
-        sy.advance(
-            tape, s, skip, ends, work, state, given, given_rows, 0, (count + 7) // 8, count, 1, 3
-        )  # fmt: skip
+        sy.advance(launch, 1)
         for w in range(count):
             _sense(values, settings, layout, state, w, settings[SENSOR_SHARE])
     observe(everyone, values, layout, state, observations)

@@ -216,15 +216,11 @@ def _judge(actions, values, settings, layout, state, observations, rewards, flag
 @sy.kernel
 def _step(
     actions, everyone, values, streams, settings, layout, observations, rewards, flags,
-    tape, s, skip, ends, work, state, given, given_rows, substeps,
+    state, launch, substeps,
 ):  # fmt: skip
     """A control step of all worlds: control, physics, observation, reward."""
-    count = actions.shape[0]
     _control(actions, values, streams, settings, layout, state)
-    blocks = (count + 7) // 8
-    sy.advance(
-        tape, s, skip, ends, work, state, given, given_rows, 0, blocks, count, substeps, 3
-    )  # fmt: skip
+    sy.advance(launch, substeps)
     _observe(everyone, values, layout, state, observations)
     return _judge(actions, values, settings, layout, state, observations, rewards, flags)
 
@@ -294,7 +290,7 @@ class PlatformTask(Task):
         """One control step of all worlds."""
         ended: int = _step(
             actions, self._everyone, self.values, self.streams, self.settings, self.layout,
-            self.observations, self.rewards, self.flags, *self.world.launch, self.substeps,
+            self.observations, self.rewards, self.flags, self.world.state, self.world.launch, self.substeps,
         )  # fmt: skip
         return ended
 

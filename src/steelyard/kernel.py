@@ -1,4 +1,4 @@
-"""The one way this project compiles a function: ``kernel``.
+"""The ways this project compiles a function: ``kernel`` for Python to call, ``inner`` for kernels to call.
 
 numba's disk cache looks at the file of the compiled function alone. A kernel that calls another file's
 kernel would therefore keep running the old machine code after an edit there. Here every cache entry is
@@ -11,12 +11,18 @@ import hashlib
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numba
 from numba.core.caching import IndexDataCacheFile
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import Compiler
 
 _PACKAGE = Path(__file__).resolve().parent
+
+#: Divisions follow IEEE (no exception on zero); no fast-math.
+OPTIONS: Any = {"nogil": True, "error_model": "numpy"}
 
 
 @cache
@@ -34,18 +40,15 @@ def source_stamp(function: Callable[..., Any]) -> tuple[str, str]:
     return _digest(_PACKAGE), _digest(Path(function.__code__.co_filename).resolve().parent)
 
 
-def _compile(function: Callable[..., Any], **options: bool | str) -> Any:
-    settings: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy", **options}
-    dispatcher: Any = numba.njit(**settings)(function)
-    store: Any = getattr(dispatcher, "_cache", None)  # absent when NUMBA_DISABLE_JIT is set
-    implementation = getattr(store, "_impl", None)
+def stamp(store: Any, function: Callable[..., Any]) -> None:
+    """Make numba's cache of a function depend on all engine sources."""
+    implementation = getattr(store, "_impl", None)  # absent when NUMBA_DISABLE_JIT is set
     if implementation is not None:
         store._cache_file = IndexDataCacheFile(
             cache_path=implementation.locator.get_cache_path(),
             filename_base=implementation.filename_base,
             source_stamp=source_stamp(function),
         )
-    return dispatcher
 
 
 def kernel(function: Callable[..., Any]) -> Any:
@@ -54,18 +57,36 @@ def kernel(function: Callable[..., Any]) -> Any:
     Divisions follow IEEE (no exception on zero) and no fast-math is allowed, so results are the same
     bits wherever a world stands in a batch. Kernels allocate nothing and raise nothing.
     """
-    return _compile(function)
+    dispatcher: Any = numba.njit(cache=True, **OPTIONS)(function)
+    stamp(getattr(dispatcher, "_cache", None), function)
+    return dispatcher
+
+
+class _Ingredient(JITCodeLibrary):
+    """Code that is only ever linked into other code: optimised there, and never turned into machine code alone.
+
+    numba would optimise and translate it here, once more in its caller, and so on up the call tree.
+    """
+
+    #: Nothing runs, so there is no place to write the environment of a run to.
+    codegen = SimpleNamespace(set_env=lambda name, env: None)
+
+    def _optimize_final_module(self) -> None:
+        pass
+
+    def _finalize_final_module(self) -> None:
+        self._finalized = True
+
+    def get_pointer_to_function(self, name: str) -> int:
+        return 0
+
+
+class _IngredientCompiler(Compiler):
+    def __init__(self, typing: Any, target: Any, library: Any, *rest: Any) -> None:
+        super().__init__(typing, target, library or _Ingredient(target.codegen(), "inner"), *rest)
 
 
 def inner(function: Callable[..., Any]) -> Any:
-    """A kernel that only kernels call: the same, less the wrapper for Python, which takes long to compile."""
-    return _compile(function, no_cpython_wrapper=True, no_cfunc_wrapper=True)
-
-
-def part(function: Callable[..., Any]) -> Any:
-    """An inner kernel that is copied into its one caller before either is compiled.
-
-    LLVM optimises a kernel together with all that it calls, once for each level of a call tree. The few levels
-    that hold nearly everything would each cost as much again.
-    """
-    return _compile(function, no_cpython_wrapper=True, no_cfunc_wrapper=True, inline="always")
+    """A kernel that only kernels call: no wrapper for Python, no machine code and no cache of its own."""
+    settings: Any = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, **OPTIONS}
+    return numba.njit(pipeline_class=_IngredientCompiler, **settings)(function)

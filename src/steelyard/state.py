@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .math.lanes import LANES
+from .math.pointers import LANES
 from .model.compile import Model
 from .model.parameters import PARTICLES, Key
 from .scene import checks
 from .scene.particle import Particle
-from .stepping import PICKED
 
 if TYPE_CHECKING:
     from .world import World
@@ -54,14 +53,12 @@ def new_state(model: Model, worlds: int) -> np.ndarray:
     return state
 
 
-def new_scratch(model: Model) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def new_scratch(model: Model) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Work arrays of one thread: rows, skipped blocks, ends and values of contacts."""
-    contacts = max(model.contacts_most, 1)
     return (
         aligned((model.rows, LANES)),
-        np.zeros(model.blocks + PICKED, dtype=np.int64),
-        np.zeros(contacts, dtype=np.int64),
-        np.zeros((contacts, 12)),
+        np.zeros(model.skip, dtype=np.int64),
+        np.zeros(3 * LANES, dtype=np.int64),
     )
 
 

@@ -1,102 +1,89 @@
 """The one stepping kernel: all substeps of a range of worlds, block after block of ``LANES``.
 
-A block's state is copied to the scratch, stepped there and copied back; parameters that differ between worlds
-are copied in beside it. This file reads as the recipe of every method.
+A block's state is copied to the scratch, stepped there by the stages of the recipe and copied back; parameters that
+differ between worlds are copied in beside it.
 """
 
 from __future__ import annotations
 
-from .collision.geometry import contact_geometry
-from .constraints.riders import rider_advance
-from .integrators.closed_form import closed_form_step
-from .integrators.explicit_euler import explicit_euler_step
-from .integrators.rattle import rattle_first_half, rattle_second_half
-from .integrators.symplectic_euler import symplectic_euler_step
-from .kernel import inner, kernel, part
-from .math.lanes import LANES, any_lane, fma, load, load_at, select, splat, store, store_at
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numba import types
+
+from .kernel import inner, kernel
+from .math.lanes import any_lane, fma, load, load_at, select, splat, store, store_at
+from .math.pointers import LANES, Integers, doubles_at, integers_at, tape_at
 from .model.tape import (
-    CLOSED_FORM,
-    DIRECT,
-    EXPLICIT_EULER,
-    H_CONSTRAINED,
-    H_CONTACTS,
+    FRESH,
+    H_BLOCKS,
     H_DT,
     H_GIVEN_UP,
-    H_INTEGRATOR,
+    H_HASTY,
     H_NONFINITE,
     H_PARTICLES,
     H_POSITION,
-    H_SOLVER,
+    H_RECIPE,
     H_STATE_ROWS,
     H_TIME,
     H_VELOCITY,
-    H_WINCHES,
-    RATTLE,
-    WORST_FIRST,
+    HASTY,
 )
-from .solvers.stages import begin_step, constraint_stage
-from .solvers.worst_first import resolve_worst_first
+from .stage import Stage, call_stage, caller
+
+if TYPE_CHECKING:
+    from .model.compile import Model
 
 FIRST_HALF, SECOND_HALF = 1, 2
 BOTH_HALVES = FIRST_HALF | SECOND_HALF
-#: Entries of ``skip`` after its blocks: worlds of the block at hand and worlds that wait.
-PICKED = 3 * LANES
 _HASTY_STEPS = 2
 
+# Entries of a launch: addresses of the stepping kernel and of the arrays it works on, and their sizes.
+(
+    L_ADVANCE,
+    L_TAPE,
+    L_SCRATCH,
+    L_SKIP,
+    L_PICKED,
+    L_STATE,
+    L_WIDTH,
+    L_GIVEN,
+    L_GIVEN_ROWS,
+    L_GIVEN_COUNT,
+    L_WORLDS,
+) = range(11)
+
 
 @inner
-def _load_rows(s, source, targets, first_target, picked, whole):
-    """Copy the rows of ``source`` to the scratch: to ``targets``, or from ``first_target`` on."""
+def _load_rows(s, source, width, count, targets, by_name, picked, whole):
+    """Copy rows of ``source`` to the scratch: to ``targets`` if ``by_name``, else to its first rows."""
     first = picked[0]
-    for index in range(source.shape[0]):
-        row = targets[index] if first_target < 0 else first_target + index
+    for index in range(count):
+        row = targets[index] if by_name else index
         if whole:
-            store(s, row, load_at(source, index, first))
+            store(s, row, load_at(source, width * index + first))
         else:
             for k in range(LANES):
-                s[row, k] = source[index, picked[k]]
+                s[row, k] = source[width * index + picked[k]]
 
 
 @inner
-def _store_world(tape, s, state, k, world):
+def _store_world(tape, s, state, width, k, world):
     """Copy one lane's state back."""
     for row in range(tape[H_STATE_ROWS]):
-        state[row, world] = s[row, k]
+        state[width * row + world] = s[row, k]
 
 
 @inner
-def _store_block(tape, s, state, picked, count, whole):
+def _store_block(tape, s, state, width, picked, count, whole):
     """Copy the state of the picked worlds back."""
     if whole:
         first = picked[0]
         for row in range(tape[H_STATE_ROWS]):
-            store_at(state, row, first, load(s, row))
+            store_at(state, width * row + first, load(s, row))
     else:
         for k in range(count):
-            _store_world(tape, s, state, k, picked[k])
-
-
-@inner
-def _advance_controls(tape, s, dt):
-    """Winches and riders move to where they are at the step's end."""
-    at = tape[H_WINCHES]
-    for index in range(tape[at]):
-        winch = at + 1 + 3 * index
-        length, speed = tape[winch], tape[winch + 1]
-        rate = load(s, speed)
-        end_rate = fma(dt, load(s, tape[winch + 2]), rate)
-        store(s, length, fma(splat(0.5) * dt, rate + end_rate, load(s, length)))
-        store(s, speed, end_rate)
-    rider_advance(tape, s, dt)
-
-
-@inner
-def _worst_first(tape, s, ends, values):
-    """Contacts of the source's method, world after world."""
-    contact_geometry(tape, s)
-    past = tape[H_POSITION] + 3 * tape[H_PARTICLES]
-    for k in range(LANES):
-        resolve_worst_first(tape, s, k, ends, values, tape[H_POSITION], past, s[tape[H_DT], k])
+            _store_world(tape, s, state, width, k, picked[k])
 
 
 @inner
@@ -111,82 +98,39 @@ def _flag_nonfinite(tape, s):
     store(s, flag, select(sum_ <= zero, load(s, flag), splat(1.0)))
 
 
-@part
-def _staged_step(tape, s, skip, dt, phase, fresh, hasty):
-    """RATTLE or symplectic Euler: each half moves freely, then a stage puts it on the constraints.
-
-    One place in the code for both stages: it is compiled once.
-    """
-    rattle = tape[H_INTEGRATOR] == RATTLE
-    constrained = tape[H_CONSTRAINED] != 0
-    for half in range(2):
-        velocity = half == 1
-        if velocity:
-            if phase & SECOND_HALF and rattle:
-                rattle_second_half(tape, s, dt)
-        elif phase & FIRST_HALF:
-            if constrained:
-                fresh = begin_step(tape, s, skip, dt) or fresh
-            _advance_controls(tape, s, dt)
-            if rattle:
-                rattle_first_half(tape, s, dt)
-            else:
-                symplectic_euler_step(tape, s, dt)
-        wanted = phase & (SECOND_HALF if velocity else FIRST_HALF)
-        if constrained and wanted:
-            constraint_stage(tape, s, skip, velocity, dt, fresh, hasty)
-
-
-@part
-def _step(tape, s, skip, ends, values, dt, phase, fresh, hasty):
-    """One substep of a block by the method on the tape."""
-    integrator = tape[H_INTEGRATOR]
-    worst_first = tape[H_CONSTRAINED] != 0 and tape[H_SOLVER] == WORST_FIRST
-    if integrator == CLOSED_FORM:
-        closed_form_step(tape, s)
-    elif integrator == EXPLICIT_EULER or worst_first:
-        _advance_controls(tape, s, dt)
-        if integrator == EXPLICIT_EULER:
-            explicit_euler_step(tape, s, dt)
-        else:
-            symplectic_euler_step(tape, s, dt)
-        if worst_first:
-            _worst_first(tape, s, ends, values)
-    else:
-        _staged_step(tape, s, skip, dt, phase, fresh, hasty)
-
-
 @inner
-def _may_be_hasty(tape, worlds, substeps, phase):
-    """Whether worlds with slipping contacts are worth doing over: in few steps, in which few worlds will, of many."""
-    contacts = tape[tape[H_CONTACTS]]
-    direct = tape[H_SOLVER] == DIRECT
-    worth = worlds > LANES and substeps <= _HASTY_STEPS
-    return direct and contacts > 0 and phase == BOTH_HALVES and worth
+def _step(tape, s, skip, phase):
+    """One substep of a block: the recipe's stages that belong to the wanted halves."""
+    at = tape[H_RECIPE]
+    for index in range(tape[at]):
+        half = tape[at + 2 + 2 * index]
+        if phase & (SECOND_HALF if half == 1 else FIRST_HALF):
+            call_stage(tape[at + 1 + 2 * index], tape, s, skip, half)
+    if phase & SECOND_HALF:
+        clock = tape[H_TIME]
+        store(s, clock, load(s, clock) + load(s, tape[H_DT]))
 
 
-@kernel
-def advance(
-    tape, s, skip, ends, values, state, given, given_rows, first, last, worlds, substeps, phase
-):
+def _advance_blocks(launch, first, last, substeps, phase):
     """Advance the worlds of blocks ``first`` ... ``last - 1`` by ``substeps``.
 
     The cost of a block is that of its hardest world. So contacts are first taken to stick; worlds where they do
-    not are put aside, and done over in blocks of their own.
-
-    Args:
-        tape: (n,) int64, see ``model.tape``.
-        s: scratch (rows, LANES) float64, parameters shared by all worlds in place.
-        skip: (blocks + PICKED,) int64 work array.
-        ends: (contacts,) int64 work array of the worst-first resolver.
-        values: (contacts, 12) float64 work array of the same.
-        state: (state rows, padded worlds) float64, changed in place.
-        given: (own parameter rows, padded worlds) float64.
-        given_rows: (own parameter rows,) int64, their rows in the scratch.
-        phase: FIRST_HALF | SECOND_HALF; single halves let user-written forces in between.
+    not are put aside, and done over in blocks of their own. That is worth it in few steps, in which few
+    worlds of many slip.
     """
+    tape = tape_at(launch[L_TAPE])
+    s = doubles_at(launch[L_SCRATCH])
+    skip = integers_at(launch[L_SKIP])
     # Worlds in the block at hand, then worlds that wait for a second try.
-    picked = skip[skip.shape[0] - PICKED :]
+    picked = integers_at(launch[L_PICKED])
+    state = doubles_at(launch[L_STATE])
+    width = launch[L_WIDTH]
+    given = doubles_at(launch[L_GIVEN])
+    given_rows = integers_at(launch[L_GIVEN_ROWS])
+    worlds = launch[L_WORLDS]
+    words = tape[H_BLOCKS]
+    worth = worlds > LANES and substeps <= _HASTY_STEPS
+    worth = worth and tape[H_HASTY] != 0 and phase == BOTH_HALVES
     waiting = 0
     block = first
     while block < last or waiting > 0:
@@ -200,19 +144,17 @@ def advance(
         else:
             count = min(worlds - LANES * block, LANES)
             whole = count == LANES
-            hasty = _may_be_hasty(tape, worlds, substeps, phase)
+            hasty = worth
             for k in range(LANES):
                 picked[k] = LANES * block + min(k, count - 1)
             block += 1
-        _load_rows(s, state, given_rows, 0, picked, whole)
-        _load_rows(s, given, given_rows, -1, picked, whole)
+        _load_rows(s, state, width, tape[H_STATE_ROWS], given_rows, False, picked, whole)
+        _load_rows(s, given, width, launch[L_GIVEN_COUNT], given_rows, True, picked, whole)
         store(s, tape[H_GIVEN_UP], splat(0.0))
-        dt = load(s, tape[H_DT])
+        skip[words + HASTY] = 1 if hasty else 0
         for substep in range(substeps):
-            _step(tape, s, skip, ends, values, dt, phase, substep == 0, hasty)
-            if phase & SECOND_HALF:
-                clock = tape[H_TIME]
-                store(s, clock, load(s, clock) + dt)
+            skip[words + FRESH] = 1 if substep == 0 else 0
+            _step(tape, s, skip, phase)
         _flag_nonfinite(tape, s)
         if hasty and any_lane(load(s, tape[H_GIVEN_UP]) > splat(0.5)):
             for k in range(count):
@@ -221,6 +163,59 @@ def advance(
                     picked[LANES + waiting] = world
                     waiting += 1
                 else:
-                    _store_world(tape, s, state, k, world)
+                    _store_world(tape, s, state, width, k, world)
         else:
-            _store_block(tape, s, state, picked, count, whole)
+            _store_block(tape, s, state, width, picked, count, whole)
+
+
+_ARGUMENTS = (Integers, types.int64, types.int64, types.int64, types.int64)
+_advance = Stage(_advance_blocks, _ARGUMENTS)
+_call_advance = caller(_ARGUMENTS)
+
+
+def launch(
+    model: Model,
+    scratch: tuple[np.ndarray, ...],
+    state: np.ndarray,
+    given: tuple[np.ndarray, np.ndarray],
+    worlds: int,
+) -> np.ndarray:
+    """What kernels need to step worlds, (11,) int64; it holds addresses, so its arrays must outlive it.
+
+    Args:
+        model: the scene compiled.
+        scratch: work arrays of one thread.
+        state: (state rows, padded worlds) float64, which stepping changes.
+        given: own parameter rows (n, padded worlds), and their rows in the scratch (n,).
+        worlds: number of worlds.
+    """
+    s, skip, picked = scratch
+    values, rows = given
+    arrays = (model.tape, s, skip, picked, state)
+    addresses = [array.ctypes.data for array in arrays]
+    return np.array(
+        [
+            _advance.address, *addresses, state.shape[1], values.ctypes.data, rows.ctypes.data,
+            len(rows), worlds,
+        ],
+        dtype=np.int64,
+    )  # fmt: skip
+
+
+@kernel
+def advance_blocks(launch, first, last, substeps, phase):
+    """Advance the worlds of blocks ``first`` ... ``last - 1``; ``phase`` is FIRST_HALF | SECOND_HALF."""
+    _call_advance(launch[L_ADVANCE], integers_at(launch.ctypes.data), first, last, substeps, phase)
+
+
+@inner
+def advance(launch, substeps):
+    """Advance all worlds of ``World.launch``, within a kernel.
+
+    Args:
+        launch: (n,) int64.
+        substeps: number of steps.
+    """
+    blocks = (launch[L_WORLDS] + LANES - 1) // LANES
+    pointer = integers_at(launch.ctypes.data)
+    _call_advance(launch[L_ADVANCE], pointer, 0, blocks, substeps, BOTH_HALVES)

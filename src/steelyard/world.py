@@ -11,7 +11,7 @@ import numpy as np
 from .diagnostics.energy import world_energy
 from .diagnostics.health import health_flags
 from .diagnostics.residual import link_residuals
-from .math.lanes import LANES
+from .math.pointers import LANES
 from .methods import DEFAULT, Method
 from .model.compile import Model, compile_model
 from .model.parameters import PARTICLES, Key
@@ -31,7 +31,7 @@ from .state import (
     new_scratch,
     new_state,
 )
-from .stepping import FIRST_HALF, SECOND_HALF, advance
+from .stepping import FIRST_HALF, SECOND_HALF, advance_blocks, launch
 from .written import evaluate_forces, generate_contacts
 
 
@@ -52,7 +52,7 @@ class World:
 
     # Slots, so that a misspelt assignment is an error and not a new attribute.
     __slots__ = (
-        "_given", "_given_rows", "_method", "_model", "_scene", "_scratch", "_split", "_stale",
+        "_given", "_given_rows", "_launch", "_method", "_model", "_scene", "_scratch", "_split", "_stale",
         "_state", "_threads", "_worlds",
     )  # fmt: skip
     _model: Model
@@ -129,11 +129,7 @@ class World:
                 list(pool.map(self._chunk, *zip(*jobs, strict=True)))
 
     def _chunk(self, thread: int, first: int, last: int, steps: int, phase: int) -> None:
-        scratch, skip, ends, values = self._scratch[thread]
-        advance(
-            self._model.tape, scratch, skip, ends, values, self._state, self._given,
-            self._given_rows, first, last, self._worlds, steps, phase,
-        )  # fmt: skip
+        advance_blocks(self._launch[thread], first, last, steps, phase)
 
     def _step_split(self) -> None:
         """One step in parts, with user-written forces and contacts evaluated in between."""
@@ -217,6 +213,13 @@ class World:
         """The whole state, shape (state rows, padded worlds); ``row`` says what lies where."""
         return self._state
 
+    @property
+    def given(self) -> np.ndarray:
+        """Parameter rows that differ between worlds, (n, padded worlds), in the order of declaration."""
+        if self._stale:
+            self._prepare()
+        return self._given
+
     def row(self, thing: Any, name: str) -> int:
         """First row in ``state`` of a part of it.
 
@@ -229,8 +232,10 @@ class World:
         return self.model.places[thing, name][0]
 
     @property
-    def launch(self) -> tuple[np.ndarray, ...]:
-        """The first eight arguments of ``steelyard.advance``, for kernels that step worlds.
+    def launch(self) -> np.ndarray:
+        """What ``steelyard.advance`` steps these worlds by, (n,) int64, for kernels of one's own.
+
+        It holds addresses of this world's arrays: ask for it at every call.
 
         Raises:
             ValueError: the scene has user-written forces or contacts, which only ``step`` can call.
@@ -241,7 +246,7 @@ class World:
             )
         if self._stale:
             self._prepare()
-        return (self._model.tape, *self._scratch[0], self._state, self._given, self._given_rows)
+        return self._launch[0]
 
     # Diagnostics
 
@@ -361,6 +366,11 @@ class World:
         for scratch, *_ in self._scratch:
             for row, value in shared:
                 scratch[row : row + len(value)] = value[:, None]
+        given = self._given, self._given_rows
+        self._launch = [
+            launch(self._model, scratch, self._state, given, self._worlds)
+            for scratch in self._scratch
+        ]
         self._stale = False
 
     def _index(self, particle: Particle) -> int:

@@ -17,18 +17,24 @@ from typing import ClassVar
 
 import numpy as np
 
-from ..kernel import inner, kernel
+from ..kernel import kernel
 from ..math.lanes import fma, load, store
-from ..model.tape import CLOSED_FORM, H_ACCELERATION, H_DAMPING, H_DRIFT, H_POSITION, H_VELOCITY
+from ..model.tape import H_ACCELERATION, H_DAMPING, H_DRIFT, H_POSITION, H_VELOCITY
 from ..scene import checks
-from .base import Integrator
+from ..solvers.base import Solver
+from ..stage import stage
+from .base import Integrator, Recipe
 
 
 @dataclass(frozen=True)
 class ClosedForm(Integrator):
     """Exact flight of free particles (see the module)."""
 
-    code: ClassVar[int] = CLOSED_FORM
+    flies: ClassVar[bool] = True
+
+    def recipe(self, solver: Solver | None) -> Recipe:
+        """One exact flow."""
+        return ((closed_form_step, 0),)
 
     def order(self) -> int:
         """Exact: any order; 0 says that no slope can be measured."""
@@ -39,8 +45,8 @@ class ClosedForm(Integrator):
         return math.inf
 
 
-@inner
-def closed_form_step(tape, s):
+@stage
+def closed_form_step(tape, s, skip, half):
     """Rows H_DAMPING: per particle e^(-ch), phi1(h), phi2(h)."""
     at = tape[H_DRIFT]
     for index in range(tape[at]):

@@ -16,16 +16,18 @@ from ..forces.stiff_spring import flow_stiff_springs
 from ..kernel import inner
 from ..math.lanes import load, store
 from ..model.tape import (
-    EXPLICIT_EULER,
     H_ACCELERATION,
     H_DRIFT,
+    H_DT,
     H_FORCE,
     H_FORCED,
     H_INVERSE_MASS,
     H_POSITION,
     H_VELOCITY,
 )
-from .base import Integrator
+from ..solvers.base import Solver
+from ..stage import stage
+from .base import Integrator, Recipe
 from .motion import damp
 
 
@@ -33,8 +35,13 @@ from .motion import damp
 class ExplicitEuler(Integrator):
     """The source's integrator (see the module)."""
 
-    code: ClassVar[int] = EXPLICIT_EULER
+    sums_drag: ClassVar[bool] = True
     solver_stages: ClassVar[tuple[bool, ...]] = (False,)
+
+    def recipe(self, solver: Solver | None) -> Recipe:
+        """Integrate; contacts are resolved afterwards."""
+        own = (explicit_euler_step, 0)
+        return (own,) if solver is None else (own, (solver.stage, 0))
 
     def order(self) -> int:
         """First order."""
@@ -63,11 +70,11 @@ def _integrate(tape, s, dt):
             store(s, v, load(s, v) + a * dt)
 
 
-@inner
-def explicit_euler_step(tape, s, dt):
+@stage
+def explicit_euler_step(tape, s, skip, half):
     """Integrate; contacts are resolved afterwards."""
     accumulate_forces(tape, s)
     add_drag(tape, s)
-    _integrate(tape, s, dt)
+    _integrate(tape, s, load(s, tape[H_DT]))
     damp(tape, s)
     flow_stiff_springs(tape, s)

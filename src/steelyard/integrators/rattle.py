@@ -13,13 +13,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
+from ..constraints.controls import move_controls
 from ..forces.accumulate import accumulate_forces
 from ..forces.drag import flow_drag
 from ..forces.stiff_spring import flow_stiff_springs
-from ..kernel import inner
-from ..math.lanes import splat
-from ..model.tape import RATTLE
-from .base import Integrator
+from ..math.lanes import load, splat
+from ..model.tape import H_DT
+from ..solvers.base import Solver
+from ..solvers.stages import begin_step
+from ..stage import stage
+from .base import Integrator, Recipe
 from .motion import damp, drift, kick
 
 
@@ -27,9 +30,21 @@ from .motion import damp, drift, kick
 class Rattle(Integrator):
     """Velocity Verlet, with constraints RATTLE (see the module)."""
 
-    code: ClassVar[int] = RATTLE
     damping_share: ClassVar[float] = 0.5
     solver_stages: ClassVar[tuple[bool, ...]] = (True,)
+
+    def recipe(self, solver: Solver | None) -> Recipe:
+        """Both halves, each followed by its stage of the constraints."""
+        if solver is None:
+            return ((rattle_first_half, 0), (rattle_second_half, 1))
+        return (
+            (begin_step, 0),
+            (move_controls, 0),
+            (rattle_first_half, 0),
+            (solver.stage, 0),
+            (rattle_second_half, 1),
+            (solver.stage, 1),
+        )
 
     def order(self) -> int:
         """Second order."""
@@ -40,9 +55,10 @@ class Rattle(Integrator):
         return 2.0
 
 
-@inner
-def rattle_first_half(tape, s, dt):
+@stage
+def rattle_first_half(tape, s, skip, half):
     """Up to the drift; the position stage follows."""
+    dt = load(s, tape[H_DT])
     accumulate_forces(tape, s)
     damp(tape, s)
     flow_drag(tape, s, False)
@@ -51,10 +67,10 @@ def rattle_first_half(tape, s, dt):
     flow_stiff_springs(tape, s)
 
 
-@inner
-def rattle_second_half(tape, s, dt):
+@stage
+def rattle_second_half(tape, s, skip, half):
     """From the new positions on; the velocity stage follows."""
     accumulate_forces(tape, s)
-    kick(tape, s, splat(0.5) * dt)
+    kick(tape, s, splat(0.5) * load(s, tape[H_DT]))
     flow_drag(tape, s, True)
     damp(tape, s)

@@ -9,12 +9,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
+from ..constraints.controls import move_controls
 from ..forces.accumulate import accumulate_forces
 from ..forces.drag import flow_drag
 from ..forces.stiff_spring import flow_stiff_springs
-from ..kernel import inner
-from ..model.tape import SYMPLECTIC_EULER
-from .base import Integrator
+from ..math.lanes import load
+from ..model.tape import H_DT
+from ..solvers.base import Solver
+from ..solvers.stages import begin_step
+from ..stage import stage
+from .base import Integrator, Recipe
 from .motion import damp, drift, kick
 
 
@@ -22,8 +26,21 @@ from .motion import damp, drift, kick
 class SymplecticEuler(Integrator):
     """Semi-implicit Euler (see the module)."""
 
-    code: ClassVar[int] = SYMPLECTIC_EULER
     solver_stages: ClassVar[tuple[bool, ...]] = (True, False)
+
+    def recipe(self, solver: Solver | None) -> Recipe:
+        """Damp, kick and drift, then the constraints."""
+        if solver is None:
+            return ((symplectic_euler_step, 0),)
+        if not solver.staged:
+            return ((move_controls, 0), (symplectic_euler_step, 0), (solver.stage, 0))
+        return (
+            (begin_step, 0),
+            (move_controls, 0),
+            (symplectic_euler_step, 0),
+            (solver.stage, 0),
+            (solver.stage, 1),
+        )
 
     def order(self) -> int:
         """First order."""
@@ -34,9 +51,10 @@ class SymplecticEuler(Integrator):
         return 2.0
 
 
-@inner
-def symplectic_euler_step(tape, s, dt):
+@stage
+def symplectic_euler_step(tape, s, skip, half):
     """Damp, kick and drift; constraints follow."""
+    dt = load(s, tape[H_DT])
     accumulate_forces(tape, s)
     damp(tape, s)
     flow_drag(tape, s, False)

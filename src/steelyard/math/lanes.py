@@ -19,7 +19,7 @@ from numba.core import cgutils
 from numba.core.extending import intrinsic, lower_builtin, models, register_model
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 
-LANES = 8
+from .pointers import LANES
 
 
 def _operation(function: Any) -> Any:
@@ -62,59 +62,55 @@ class _MaskModel(models.PrimitiveModel):
         super().__init__(manager, frontend, _BITS)
 
 
-def _pointer(context: Any, builder: Any, array_type: Any, array: Any, row: Any) -> Any:
-    data = context.make_array(array_type)(context, builder, array).data
-    start = builder.gep(data, [builder.mul(row, ir.Constant(ir.IntType(64), LANES))])
-    return builder.bitcast(start, _DOUBLES.as_pointer())
+def _row(builder: Any, pointer: Any, entry: Any) -> Any:
+    """Address of the lane vector that begins at an entry."""
+    return builder.bitcast(builder.gep(pointer, [entry]), _DOUBLES.as_pointer())
+
+
+def _entry(builder: Any, row: Any) -> Any:
+    return builder.mul(row, ir.Constant(ir.IntType(64), LANES))
 
 
 @_operation
 def load(typing_context: Any, rows: Any, row: Any) -> Any:
-    """Lane vector in row ``row`` of a C-contiguous scratch of shape (rows, LANES)."""
+    """Lane vector in row ``row`` of the scratch (rows, LANES), which starts on a cache line."""
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        return builder.load(_pointer(context, builder, sig.args[0], args[0], args[1]), align=8)
+        return builder.load(_row(builder, args[0], _entry(builder, args[1])), align=64)
 
     return lane(rows, types.int64), codegen
 
 
 @_operation
 def store(typing_context: Any, rows: Any, row: Any, value: Any) -> Any:
-    """Write a lane vector to row ``row`` of a scratch of shape (rows, LANES)."""
+    """Write a lane vector to row ``row`` of the scratch."""
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        builder.store(args[2], _pointer(context, builder, sig.args[0], args[0], args[1]), align=8)
+        builder.store(args[2], _row(builder, args[0], _entry(builder, args[1])), align=64)
         return context.get_dummy_value()
 
     return types.void(rows, types.int64, lane), codegen
 
 
-def _place(context: Any, builder: Any, array_type: Any, array: Any, row: Any, column: Any) -> Any:
-    view = context.make_array(array_type)(context, builder, array)
-    width = cgutils.unpack_tuple(builder, view.shape)[1]
-    start = builder.gep(view.data, [builder.add(builder.mul(row, width), column)])
-    return builder.bitcast(start, _DOUBLES.as_pointer())
+@_operation
+def load_at(typing_context: Any, numbers: Any, entry: Any) -> Any:
+    """Lane vector of ``LANES`` neighbouring entries."""
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return builder.load(_row(builder, *args), align=8)
+
+    return lane(numbers, types.int64), codegen
 
 
 @_operation
-def load_at(typing_context: Any, rows: Any, row: Any, column: Any) -> Any:
-    """Lane vector from ``LANES`` neighbouring columns of a C-contiguous array of any width."""
+def store_at(typing_context: Any, numbers: Any, entry: Any, value: Any) -> Any:
+    """Write a lane vector to ``LANES`` neighbouring entries."""
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        return builder.load(_place(context, builder, sig.args[0], *args), align=8)
-
-    return lane(rows, types.int64, types.int64), codegen
-
-
-@_operation
-def store_at(typing_context: Any, rows: Any, row: Any, column: Any, value: Any) -> Any:
-    """Write a lane vector to ``LANES`` neighbouring columns."""
-
-    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        builder.store(args[3], _place(context, builder, sig.args[0], *args[:3]), align=8)
+        builder.store(args[2], _row(builder, *args[:2]), align=8)
         return context.get_dummy_value()
 
-    return types.void(rows, types.int64, types.int64, lane), codegen
+    return types.void(numbers, types.int64, lane), codegen
 
 
 @_operation

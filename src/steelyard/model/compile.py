@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from ..integrators.base import Recipe
+from ..math.pointers import LANES
 from ..methods import Method
 from ..scene.contacts import (
     ContactGenerator,
@@ -43,9 +45,9 @@ class Model:
         start: (state rows,) state at time 0.
         parameters: assignable values and the rows that follow from them.
         places: first state row and size of what varies, by (thing, name).
-        stages: names of what runs in a step, for people.
-        contacts_most: most contacts that a world can have at once.
+        recipe: stages of a step in order, each with its half.
         blocks: number of matrix blocks.
+        skip: entries of the flags of blocks and what stands behind them.
     """
 
     scene: Scene
@@ -56,8 +58,8 @@ class Model:
     start: np.ndarray = field(default_factory=lambda: np.zeros(0))
     parameters: Parameters = field(default_factory=Parameters)
     places: dict[Key, tuple[int, int]] = field(default_factory=dict)
-    stages: list[str] = field(default_factory=list)
-    contacts_most: int = 0
+    recipe: Recipe = ()
+    skip: int = 0
     blocks: int = 0
     dropped: list[Any] = field(default_factory=list)
 
@@ -81,13 +83,14 @@ class Compiler:
         self.widths = {
             "springs": 7, "gravities": 3, "buoyancies": 5, "drags": 7, "stiff_springs": 8, "drift": 1,
             "winches": 3, "movers": 5, "links": LINK, "contacts": CONTACT, "generators": 2,
+            "recipe": 2,
         }  # fmt: skip
         self.next_row = 0
         self.start: list[float] = []
         #: First row of minus the weights at the step's start, by rider.
         self.held: dict[int, int] = {}
-        direct = method.solver is not None and method.solver.code == tape.DIRECT
-        self.network = Network(self) if direct else None
+        sparse = method.solver is not None and method.solver.sparse
+        self.network = Network(self) if sparse else None
         if self.network is not None:
             self.links = self.network.choose()
         chosen = set(map(id, self.links))
@@ -164,7 +167,7 @@ class Compiler:
         user = self.scene.of(UserForce)
         header["user_forces"] = self.state((PARTICLES, "user"), [0.0] * 3 * count) if user else -1
         self._user_contacts()
-        if self.method.solver is not None and self.method.solver.code == tape.WORST_FIRST:
+        if self.method.solver is not None and not self.method.solver.staged:
             most = len(self.links) + len(self.contacts)
             header["moves"] = self.state((PARTICLES, "moves"), np.zeros(6 * most))
         header["time"] = self.state((PARTICLES, "time"), [0.0])
@@ -253,7 +256,7 @@ class Compiler:
         )
         share = method.integrator.damping_share * method.dt
         damping_key = (PARTICLES, "damping")
-        if method.integrator.code == tape.CLOSED_FORM:
+        if method.integrator.flies:
 
             def phis(value: np.ndarray) -> np.ndarray:
                 return np.moveaxis(derived.flight(value, method.dt), 0, 1).reshape(
@@ -277,8 +280,15 @@ class Compiler:
     def _method(self) -> None:
         """Codes and settings of the method, and the generators in the order they were added."""
         solver = self.method.solver
-        self.header["integrator"] = self.method.integrator.code
-        self.header["solver"] = tape.NO_SOLVER if solver is None else solver.code
+        held = solver if self.header["constrained"] else None
+        recipe = self.method.integrator.recipe(held)
+        self.sections["recipe"] = [word for part, half in recipe for word in (part.address, half)]
+        self.model.recipe = recipe
+        self.header["hasty"] = int(bool(held and held.sparse and self.contacts))
+        self.header["contacts_most"] = most = len(self.links) + len(self.contacts)
+        self.header["values"] = -1
+        if held is not None and not held.staged:
+            self.header["values"] = self.take(-(-12 * most // LANES))
         limit = getattr(solver, "passes", None)
         self.header["passes"] = getattr(solver, "iterations", 0) if limit is None else limit
         self.header["tolerance"] = self.constant(getattr(solver, "tolerance", 0.0))
@@ -300,6 +310,9 @@ class Compiler:
         if self.network is not None and self.header["constrained"]:
             self.network.build()
         self.header["given_up"] = self.take(1)
+        self.header["blocks"] = self.model.blocks
+        self.header["ends"] = self.model.blocks + tape.WORDS
+        self.model.skip = self.header["ends"] + self.header["contacts_most"]
 
     def _write(self) -> None:
         """The tape: header, then every section with its count in front."""

@@ -147,7 +147,6 @@ def add_contacts(c: Compiler) -> None:
             c.take(6) if staged else -1,
         ]  # fmt: skip
     c.sections["contacts"] = records
-    c.model.contacts_most = len(c.links) + len(c.contacts)
     c.model.blocks = len(c.contacts)
 
 

@@ -17,7 +17,7 @@ from ..scene.forces import (
     StiffSpring,
     UserForce,
 )
-from . import derived, tape
+from . import derived
 from .parameters import PARTICLES
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ def add_forces(c: Compiler) -> None:
     """Force rows and a record per force."""
     scene = c.scene
     drags = scene.of(Drag)
-    explicit = c.method.integrator.code == tape.EXPLICIT_EULER
+    explicit = c.method.integrator.sums_drag
     summed = scene.of(
         Spring, Bungee, AnchoredSpring, AnchoredBungee, Gravity, Buoyancy, UserForce
     ) or (drags and explicit)

@@ -14,8 +14,6 @@ from typing import Any
 
 import numpy as np
 
-from ..math.lanes import LANES
-
 #: The thing under which all particles' state and parameters are kept.
 PARTICLES = "particles"
 
@@ -78,5 +76,5 @@ class Parameters:
                 padded[:, worlds:] = value[:, -1:]
                 own.append(padded)
                 own_rows.extend(range(slot.row, slot.row + slot.size))
-        stacked = np.concatenate(own) if own else np.empty((0, LANES))
+        stacked = np.concatenate(own) if own else np.empty((0, width))
         return shared, np.ascontiguousarray(stacked), np.asarray(own_rows, dtype=np.int64)

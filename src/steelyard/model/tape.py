@@ -27,8 +27,12 @@ from __future__ import annotations
     H_NONFINITE,
     H_TIME,
     H_DT,
-    H_INTEGRATOR,
-    H_SOLVER,
+    H_HASTY,
+    H_BLOCKS,
+    H_ENDS,
+    H_VALUES,
+    H_CONTACTS_MOST,
+    H_RECIPE,
     H_PASSES,
     H_TOLERANCE,
     H_CONSTRAINED,
@@ -74,8 +78,8 @@ from __future__ import annotations
     H_GUESS,
     H_MASK,
     H_USED_MASK,
-) = range(65)
-HEADER = 65
+) = range(69)
+HEADER = 69
 
 # Width of the records of links and contacts; ``model.compile`` writes them field by field.
 LINK = 17
@@ -88,7 +92,9 @@ CLUSTER_HEAD, LOAD_HEAD = 11, 6
 INERTIA, INVERSE, TURN, SHIFT, CENTRE, ARMS = 0, 6, 12, 15, 18, 21
 ARM, BEFORE, AFTER, MOTION, LOAD_ROWS = 0, 3, 6, 9, 12
 
-# Codes of integrators, solvers and contact geometries.
-EXPLICIT_EULER, SYMPLECTIC_EULER, RATTLE, CLOSED_FORM = range(4)
-NO_SOLVER, WORST_FIRST, GAUSS_SEIDEL, DIRECT = range(4)
+# Words behind the flags of blocks in ``skip``, from H_BLOCKS on: whether the factor at hand is not of the step's start,
+# and whether worlds in which a contact slips or opens are to be given up.
+FRESH, HASTY, WORDS = range(3)
+
+# Codes of contact geometries.
 GROUND, LINE, USER = range(3)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
+from ..stage import Stage
+
 
 @dataclass(frozen=True)
 class Solver:
@@ -12,9 +14,10 @@ class Solver:
 
     #: Whether it finds displacements and velocities at constraint level (stages) or impulses afterwards.
     staged: ClassVar[bool] = True
-    #: Code on the tape.
-    code: ClassVar[int] = 0
+    #: Whether it solves all constraints through one sparse matrix.
+    sparse: ClassVar[bool] = False
 
-    def refusals(self, things: list[object]) -> list[str]:
-        """Reasons, in words, why this solver cannot take a scene of these things."""
-        return []
+    @property
+    def stage(self) -> Stage:
+        """What puts positions (half 0) or velocities (half 1) on the constraints."""
+        raise NotImplementedError

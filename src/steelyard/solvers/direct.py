@@ -23,33 +23,40 @@ from ..constraints.contacts import (
 )
 from ..constraints.links import link_multiplier
 from ..constraints.riders import DECK, HEAD, rider_multiplier, rider_offset, rider_slip
-from ..kernel import inner, part
+from ..kernel import inner
 from ..math.lanes import absolute, any_lane, load, select, splat, store
 from ..model.tape import (
     CONTACT,
-    DIRECT,
+    FRESH,
     H_BACKWARD,
+    H_BLOCKS,
     H_CABLES,
     H_CLUSTERS,
     H_CONTACTS,
+    H_DT,
     H_FORWARD,
     H_GIVEN_UP,
     H_GUESS,
     H_LINKS,
     H_MASK,
     H_PASSES,
+    H_POSITION,
     H_RIDERS,
     H_RIGHT,
     H_TOLERANCE,
     H_UNSETTLED,
+    H_VELOCITY,
+    HASTY,
     LINK,
 )
+from ..stage import Stage, stage
 from . import block_ldl
 from .base import Solver
 from .cables import link_error, pushing, set_changed, tighten, withdraw
 from .cone import factorise_contacts, solve_contacts
 from .gather import clear_velocity_multipliers, gather
 from .matrix import refactor
+from .stages import begin_stage, end_stage
 
 _FREE_CHANGES = 10
 # Passes after which a world whose contacts do not settle is flagged instead of tried again.
@@ -71,7 +78,12 @@ class Direct(Solver):
 
     tolerance: float = 1e-12
     passes: int = 60
-    code: ClassVar[int] = DIRECT
+    sparse: ClassVar[bool] = True
+
+    @property
+    def stage(self) -> Stage:
+        """Puts a half step on the constraints."""
+        return direct_stage
 
 
 @inner
@@ -236,7 +248,7 @@ def _apply(tape, s, skip, velocity, target, worlds):
             place_clusters(tape, s, target, worlds)
 
 
-@part
+@inner
 def solve_stage(tape, s, skip, velocity, dt, target, hasty):
     """One stage: multipliers and the rows ``target`` (positions or velocities) that meet all constraints.
 
@@ -312,3 +324,16 @@ def solve_stage(tape, s, skip, velocity, dt, target, hasty):
             break
     bad = bad | lost
     store(s, tape[H_UNSETTLED], select(bad, splat(1.0), load(s, tape[H_UNSETTLED])))
+
+
+@stage
+def direct_stage(tape, s, skip, half):
+    """Put the drifted positions, or the kicked velocities, on the constraints, impacts included."""
+    velocity = half == 1
+    begin_stage(tape, s, half)
+    words = tape[H_BLOCKS]
+    if velocity or skip[words + FRESH] != 0:
+        refactor(tape, s, skip)
+    target = tape[H_VELOCITY] if velocity else tape[H_POSITION]
+    solve_stage(tape, s, skip, velocity, load(s, tape[H_DT]), target, skip[words + HASTY] != 0)
+    end_stage(tape, s, half)

@@ -9,7 +9,6 @@ cos^2(pi/2n) per sweep on a chain of n: cheap per sweep, slow to settle long cha
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
 
 from ..constraints.contacts import contact_gap, contact_multiplier, contact_shift, contact_speed
 from ..constraints.links import link_half_square, link_multiplier, link_rate
@@ -18,17 +17,20 @@ from ..kernel import inner
 from ..math.lanes import absolute, fma, load, select, splat, sqrt, store
 from ..model.tape import (
     CONTACT,
-    GAUSS_SEIDEL,
     H_CONTACTS,
     H_IMPULSE,
     H_LINKS,
     H_PARTICLES,
     H_PASSES,
+    H_POSITION,
     H_RIDERS,
+    H_VELOCITY,
     LINK,
 )
+from ..stage import Stage, stage
 from .base import Solver
 from .gather import clear_velocity_multipliers, gather
+from .stages import begin_stage, end_stage
 
 
 @dataclass(frozen=True)
@@ -41,7 +43,11 @@ class GaussSeidel(Solver):
     """
 
     passes: int = 20
-    code: ClassVar[int] = GAUSS_SEIDEL
+
+    @property
+    def stage(self) -> Stage:
+        """Puts a half step on the constraints."""
+        return sweep_stage
 
 
 @inner
@@ -183,9 +189,12 @@ def _sweep_contacts(tape, s, skip, velocity):
             _push(s, b, mb, frame + 6, u - u0, zero - one)
 
 
-@inner
-def sweep_stage(tape, s, skip, velocity, target):
-    """One stage by sweeps; contract of ``direct.solve_stage``."""
+@stage
+def sweep_stage(tape, s, skip, half):
+    """One stage by sweeps."""
+    velocity = half == 1
+    target = tape[H_VELOCITY] if velocity else tape[H_POSITION]
+    begin_stage(tape, s, half)
     if velocity:
         clear_velocity_multipliers(tape, s)
     gather(tape, s, skip, velocity, target)
@@ -194,3 +203,4 @@ def sweep_stage(tape, s, skip, velocity, target):
         _sweep_riders(tape, s, velocity)
         _sweep_contacts(tape, s, skip, velocity)
     gather(tape, s, skip, velocity, target)
+    end_stage(tape, s, half)

@@ -17,18 +17,26 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
+from ..collision.geometry import contact_geometry
 from ..kernel import inner
+from ..math.pointers import LANES, offset
 from ..model.tape import (
     CONTACT,
     H_ACCELERATION,
     H_CONTACTS,
+    H_CONTACTS_MOST,
+    H_DT,
+    H_ENDS,
     H_GENERATORS,
     H_LINKS,
     H_MOVES,
+    H_PARTICLES,
     H_PASSES,
+    H_POSITION,
+    H_VALUES,
     LINK,
-    WORST_FIRST,
 )
+from ..stage import Stage, stage
 from .base import Solver
 
 # Columns of the local contact list.
@@ -45,19 +53,23 @@ class WorstFirst(Solver):
 
     iterations: int = 0
     staged: ClassVar[bool] = False
-    code: ClassVar[int] = WORST_FIRST
+
+    @property
+    def stage(self) -> Stage:
+        """Puts a half step on the constraints."""
+        return worst_first_stage
 
 
 @inner
 def _add(s, record, lane, ends, values, count, nx, ny, nz, depth, restitution, friction):
     """Append a contact; ``ends`` keeps where its record lies on the tape."""
     ends[count] = record
-    values[count, _NX] = nx
-    values[count, _NY] = ny
-    values[count, _NZ] = nz
-    values[count, _DEPTH] = depth
-    values[count, _RESTITUTION] = restitution
-    values[count, _FRICTION] = friction
+    values[12 * count + _NX] = nx
+    values[12 * count + _NY] = ny
+    values[12 * count + _NZ] = nz
+    values[12 * count + _DEPTH] = depth
+    values[12 * count + _RESTITUTION] = restitution
+    values[12 * count + _FRICTION] = friction
     return count + 1
 
 
@@ -126,7 +138,7 @@ def _separation(s, lane, va, vb, values, c):
     x = s[va, lane] - s[vb, lane]
     y = s[va + 1, lane] - s[vb + 1, lane]
     z = s[va + 2, lane] - s[vb + 2, lane]
-    return x * values[c, _NX] + y * values[c, _NY] + z * values[c, _NZ]
+    return x * values[12 * c + _NX] + y * values[12 * c + _NY] + z * values[12 * c + _NZ]
 
 
 @inner
@@ -160,7 +172,7 @@ def _resolve(tape, s, lane, position, zero_row, rows, values, c, dt):
     total = inverse_a + inverse_b
     if total <= 0.0:
         return
-    restitution = values[c, _RESTITUTION]
+    restitution = values[12 * c + _RESTITUTION]
     speed = _separation(s, lane, va, vb, values, c)
     if speed <= 0.0:
         wanted = -speed * restitution
@@ -172,7 +184,7 @@ def _resolve(tape, s, lane, position, zero_row, rows, values, c, dt):
                 pull += s[tape[H_ACCELERATION] + xa - position + k, lane]
             if xb < zero_row:
                 pull -= s[tape[H_ACCELERATION] + xb - position + k, lane]
-            gained += pull * values[c, k]
+            gained += pull * values[12 * c + k]
         gained *= dt
         if gained < 0.0:
             wanted += restitution * gained
@@ -180,16 +192,16 @@ def _resolve(tape, s, lane, position, zero_row, rows, values, c, dt):
                 wanted = 0.0
         impulse = (wanted - speed) / total
         for k in range(3):
-            push = values[c, k] * impulse
+            push = values[12 * c + k] * impulse
             s[va + k, lane] += push * inverse_a
             if inverse_b > 0.0:
                 s[vb + k, lane] += push * -inverse_b
-        friction = values[c, _FRICTION]
+        friction = values[12 * c + _FRICTION]
         if friction > 0.0:
             speed = _separation(s, lane, va, vb, values, c)
-            x = s[va, lane] - s[vb, lane] - speed * values[c, _NX]
-            y = s[va + 1, lane] - s[vb + 1, lane] - speed * values[c, _NY]
-            z = s[va + 2, lane] - s[vb + 2, lane] - speed * values[c, _NZ]
+            x = s[va, lane] - s[vb, lane] - speed * values[12 * c + _NX]
+            y = s[va + 1, lane] - s[vb + 1, lane] - speed * values[12 * c + _NY]
+            z = s[va + 2, lane] - s[vb + 2, lane] - speed * values[12 * c + _NZ]
             slip = math.sqrt(x * x + y * y + z * z)
             if slip > 0.0:
                 brake = min(slip / total, friction * impulse) / slip
@@ -197,33 +209,33 @@ def _resolve(tape, s, lane, position, zero_row, rows, values, c, dt):
                     s[va + k, lane] -= part * brake * inverse_a
                     if inverse_b > 0.0:
                         s[vb + k, lane] += part * brake * inverse_b
-    depth = values[c, _DEPTH]
+    depth = values[12 * c + _DEPTH]
     if depth > 0.0:
         for k in range(3):
-            move = values[c, k] * (depth / total)
-            values[c, _MOVE_A + k] = move * inverse_a
+            move = values[12 * c + k] * (depth / total)
+            values[12 * c + _MOVE_A + k] = move * inverse_a
             s[xa + k, lane] += move * inverse_a
             if inverse_b > 0.0:
-                values[c, _MOVE_B + k] = move * -inverse_b
+                values[12 * c + _MOVE_B + k] = move * -inverse_b
                 s[xb + k, lane] += move * -inverse_b
             else:
-                values[c, _MOVE_B + k] = 0.0
+                values[12 * c + _MOVE_B + k] = 0.0
 
 
 @inner
-def resolve_worst_first(tape, s, lane, ends, values, position, zero_row, dt):
+def _resolve_world(tape, s, lane, ends, values, position, zero_row, dt):
     """Resolve the contacts of one world of the block.
 
     Args:
-        ends: (contacts,) work array of tape positions.
-        values: (contacts, 12) work array.
+        ends: work entries, tape positions of contacts.
+        values: work entries, rows of twelve per contact.
         position: first row of the positions.
         zero_row: rows from here on are no particle's.
     """
     moves = tape[H_MOVES]
-    for c in range(values.shape[0]):
+    for c in range(tape[H_CONTACTS_MOST]):
         for k in range(6):
-            values[c, _MOVE_A + k] = s[moves + 6 * c + k, lane]
+            values[12 * c + _MOVE_A + k] = s[moves + 6 * c + k, lane]
     count = _find(tape, s, lane, ends, values)
     links = tape[H_LINKS]
     links_end = links + 1 + LINK * tape[links]
@@ -234,7 +246,7 @@ def resolve_worst_first(tape, s, lane, ends, values, position, zero_row, dt):
         for c in range(count):
             rows = _rows(tape, links_end, ends[c])
             speed = _separation(s, lane, rows[2], rows[3], values, c)
-            if speed < lowest and (speed < 0.0 or values[c, _DEPTH] > 0.0):
+            if speed < lowest and (speed < 0.0 or values[12 * c + _DEPTH] > 0.0):
                 lowest = speed
                 worst = c
         if worst < 0:
@@ -255,8 +267,19 @@ def resolve_worst_first(tape, s, lane, ends, values, position, zero_row, dt):
                 if moved >= 0:
                     along = 0.0
                     for k in range(3):
-                        along += values[worst, moved + k] * values[c, k]
-                    values[c, _DEPTH] += along if end == 1 else -along
-    for c in range(values.shape[0]):
+                        along += values[12 * worst + moved + k] * values[12 * c + k]
+                    values[12 * c + _DEPTH] += along if end == 1 else -along
+    for c in range(tape[H_CONTACTS_MOST]):
         for k in range(6):
-            s[moves + 6 * c + k, lane] = values[c, _MOVE_A + k]
+            s[moves + 6 * c + k, lane] = values[12 * c + _MOVE_A + k]
+
+
+@stage
+def worst_first_stage(tape, s, skip, half):
+    """Contacts of the source's method, world after world."""
+    contact_geometry(tape, s)
+    past = tape[H_POSITION] + 3 * tape[H_PARTICLES]
+    ends = offset(skip, tape[H_ENDS])
+    values = offset(s, LANES * tape[H_VALUES])
+    for k in range(LANES):
+        _resolve_world(tape, s, k, ends, values, tape[H_POSITION], past, s[tape[H_DT], k])

@@ -1,0 +1,122 @@
+"""What stages get instead of arrays: bare pointers, since an array is seven arguments and its indices wrap.
+
+``Tape`` points to integers that no kernel writes, ``Integers`` and ``Doubles`` to what kernels work on. They exist
+only inside kernels, made by ``tape_at``, ``integers_at`` and ``doubles_at`` from an address. Indices
+are not checked; ``doubles[row, k]`` is entry k of a row of LANES.
+"""
+
+from __future__ import annotations
+
+import operator
+from typing import Any
+
+from llvmlite import ir
+from numba import types
+from numba.core.extending import intrinsic, lower_builtin, models, register_model
+from numba.core.typing.templates import AbstractTemplate, infer_global, signature
+
+#: Worlds per block: entries of a row of the scratch.
+LANES = 8
+
+_INTEGER = ir.IntType(64)
+
+
+class Pointer(types.Type):
+    """Address of entries of one type."""
+
+    def __init__(self, name: str, entry: types.Type, *, constant: bool = False) -> None:
+        self.entry = entry
+        self.constant = constant
+        super().__init__(name=name)
+
+
+class _PointerModel(models.PrimitiveModel):
+    def __init__(self, manager: Any, frontend: Any) -> None:
+        entry = _INTEGER if frontend.entry == types.int64 else ir.DoubleType()
+        super().__init__(manager, frontend, entry.as_pointer())
+
+
+register_model(Pointer)(_PointerModel)
+
+Tape = Pointer("Tape", types.int64, constant=True)
+Integers = Pointer("Integers", types.int64)
+Doubles = Pointer("Doubles", types.float64)
+
+_PAIR = types.UniTuple(types.int64, 2)
+
+
+@infer_global(operator.getitem)
+class _Get(AbstractTemplate):
+    def generic(self, args: Any, kws: Any) -> Any:
+        if isinstance(args[0], Pointer):
+            index = _PAIR if isinstance(args[1], types.BaseTuple) else types.int64
+            return signature(args[0].entry, args[0], index)
+        return None
+
+
+@infer_global(operator.setitem)
+class _Set(AbstractTemplate):
+    def generic(self, args: Any, kws: Any) -> Any:
+        if isinstance(args[0], Pointer) and not args[0].constant:
+            index = _PAIR if isinstance(args[1], types.BaseTuple) else types.int64
+            return signature(types.none, args[0], index, args[0].entry)
+        return None
+
+
+def _pair_index(builder: Any, pair: Any) -> Any:
+    row = builder.mul(builder.extract_value(pair, 0), ir.Constant(_INTEGER, LANES))
+    return builder.add(row, builder.extract_value(pair, 1))
+
+
+def _get(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    value = builder.load(builder.gep(args[0], [args[1]]))
+    if sig.args[0].constant:
+        # Nothing that is stored elsewhere can have changed it.
+        value.set_metadata("invariant.load", builder.module.add_metadata([]))
+    return value
+
+
+def _set(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    builder.store(args[2], builder.gep(args[0], [args[1]]))
+    return context.get_dummy_value()
+
+
+lower_builtin(operator.getitem, Pointer, types.int64)(_get)
+lower_builtin(operator.setitem, Pointer, types.int64, types.Any)(_set)
+
+
+@lower_builtin(operator.getitem, Pointer, types.UniTuple)
+def _get_pair(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    return _get(context, builder, sig, (args[0], _pair_index(builder, args[1])))
+
+
+@lower_builtin(operator.setitem, Pointer, types.UniTuple, types.Any)
+def _set_pair(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    return _set(context, builder, sig, (args[0], _pair_index(builder, args[1]), args[2]))
+
+
+def _maker(pointer: Pointer) -> Any:
+    def make(typing_context: Any, address: Any) -> Any:
+        def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+            return builder.inttoptr(args[0], context.get_value_type(pointer))
+
+        return pointer(types.int64), codegen
+
+    return intrinsic(make)
+
+
+tape_at = _maker(Tape)
+integers_at = _maker(Integers)
+doubles_at = _maker(Doubles)
+
+
+def _offset(typing_context: Any, pointer: Any, entries: Any) -> Any:
+    """Pointer to ``entries`` further on."""
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return builder.gep(args[0], [args[1]])
+
+    return pointer(pointer, types.int64), codegen
+
+
+offset: Any = intrinsic(_offset)
