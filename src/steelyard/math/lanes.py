@@ -19,7 +19,7 @@ from numba.core import cgutils
 from numba.core.extending import intrinsic, lower_builtin, models, register_model
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 
-from .pointers import LANES
+from .pointers import FIRST, LANES
 
 
 def _operation(function: Any) -> Any:
@@ -175,12 +175,20 @@ def any_lane(typing_context: Any, condition: Any) -> Any:
     return types.boolean(mask), codegen
 
 
+#: numba finds these for integers too, but only after it has tried them for much else, a millisecond each time.
+_INDEX_ARITHMETIC = (operator.add, operator.sub, operator.mul)
+
+
 def _binary(function: Any, instruction: str, operand: types.Type) -> None:
     @infer_global(function)
     class _Template(AbstractTemplate):
+        metadata = FIRST
+
         def generic(self, args: Any, kws: Any) -> Any:
             if args == (operand, operand):
                 return signature(operand, operand, operand)
+            if args == (types.int64, types.int64) and function in _INDEX_ARITHMETIC:
+                return signature(types.int64, types.int64, types.int64)
             return None
 
     @lower_builtin(function, operand, operand)
@@ -191,6 +199,8 @@ def _binary(function: Any, instruction: str, operand: types.Type) -> None:
 def _comparison(function: Any, symbol: str) -> None:
     @infer_global(function)
     class _Template(AbstractTemplate):
+        metadata = FIRST
+
         def generic(self, args: Any, kws: Any) -> Any:
             if args == (lane, lane):
                 return signature(mask, lane, lane)

@@ -18,6 +18,9 @@ from numba.core.typing.templates import AbstractTemplate, infer_global, signatur
 #: Worlds per block: entries of a row of the scratch.
 LANES = 8
 
+#: numba tries what is made for this machine before what is made for any; else it would try all of its own first.
+FIRST = {"target": "cpu"}
+
 _INTEGER = ir.IntType(64)
 
 
@@ -47,6 +50,8 @@ _PAIR = types.UniTuple(types.int64, 2)
 
 @infer_global(operator.getitem)
 class _Get(AbstractTemplate):
+    metadata = FIRST
+
     def generic(self, args: Any, kws: Any) -> Any:
         if isinstance(args[0], Pointer):
             index = _PAIR if isinstance(args[1], types.BaseTuple) else types.int64
@@ -56,6 +61,8 @@ class _Get(AbstractTemplate):
 
 @infer_global(operator.setitem)
 class _Set(AbstractTemplate):
+    metadata = FIRST
+
     def generic(self, args: Any, kws: Any) -> Any:
         if isinstance(args[0], Pointer) and not args[0].constant:
             index = _PAIR if isinstance(args[1], types.BaseTuple) else types.int64
