@@ -9,25 +9,52 @@ from ..model.tape import (
     AFTER,
     BEFORE,
     CLUSTER_HEAD,
+    ENTRY,
     H_TOLERANCE,
     H_UNSETTLED,
     INERTIA,
+    INVERSE,
     LOAD_HEAD,
     TURN,
 )
 
 _ITERATIONS = 12
 # Newton's method squares the error: what a change leaves is about its square. It may be this share of the tolerance.
-_SHARE = 1e-6
+_SHARE = 1e-4
+
+
+@inner
+def cluster_loads(tape, at):
+    """Where the records of a cluster's loads begin."""
+    return at + CLUSTER_HEAD + ENTRY * (tape[at] + tape[at + 1])
+
+
+@inner
+def cluster_end(tape, at):
+    """Where the record of the next cluster begins."""
+    end = cluster_loads(tape, at)
+    for _ in range(tape[at + 1]):
+        end += LOAD_HEAD + tape[end + 4]
+    return end
+
+
+@inner
+def turn_root(x, y, z):
+    """q0 of a unit quaternion."""
+    least = splat(1e-3)
+    root = splat(1.0) - dot(x, y, z, x, y, z)
+    return sqrt(select(root > least, root, least))
 
 
 @inner
 def turn(tape, s, at, hx, hy, hz, worlds):
-    """The quaternion that solves the moment's equation, from the one at hand; kept in the work rows."""
+    """Find the quaternion that solves the moment's equation, from the one at hand; it stays in the work rows.
+
+    At first that is of no turn, where the equation's derivative is the inertia.
+    """
     zero = splat(0.0)
     one = splat(1.0)
     two = splat(2.0)
-    least = splat(1e-3)
     allowed = fma(splat(_SHARE), load(s, tape[H_TOLERANCE]), splat(1e-20))
     work = tape[at + 7]
     row = work + INERTIA
@@ -38,8 +65,13 @@ def turn(tape, s, at, hx, hy, hz, worlds):
     j21 = load(s, row + 4)
     j22 = load(s, row + 5)
     x, y, z = load_vector(s, work + TURN)
-    root = one - dot(x, y, z, x, y, z)
-    root = sqrt(select(root > least, root, least))
+    at_rest = worlds & (dot(x, y, z, x, y, z) <= zero)
+    if any_lane(at_rest):
+        u, v, w = symmetric_product(s, work + INVERSE, hx, hy, hz)
+        x = select(at_rest, u, x)
+        y = select(at_rest, v, y)
+        z = select(at_rest, w, z)
+    root = turn_root(x, y, z)
     moving = worlds
     for _ in range(_ITERATIONS):
         u, v, w = symmetric_product(s, row, x, y, z)
@@ -64,11 +96,11 @@ def turn(tape, s, at, hx, hy, hz, worlds):
         cx = fma(u, sz, fma(root, j20, cx)) - v
         cy = fma(v, sz, fma(root, j21, cy)) + u
         cz = fma(w, sz, fma(root, j22, cz))
-        rider = at + CLUSTER_HEAD + tape[at]
+        rider = cluster_loads(tape, at)
         for _ in range(tape[at + 1]):
             # Of a load's: (R - 1) r = 2 (q0 q x r + q x (q x r)), between r0 and the change of q.
-            px, py, pz = load_vector(s, tape[rider + 4] + BEFORE)
-            rx, ry, rz = load_vector(s, tape[rider + 4] + AFTER)
+            px, py, pz = load_vector(s, tape[rider + 3] + BEFORE)
+            rx, ry, rz = load_vector(s, tape[rider + 3] + AFTER)
             tx, ty, tz = cross(x, y, z, rx, ry, rz)
             ox, oy, oz = cross(x, y, z, tx, ty, tz)
             ox, oy, oz = cross(px, py, pz, fma(root, tx, ox), fma(root, ty, oy), fma(root, tz, oz))
@@ -101,17 +133,15 @@ def turn(tape, s, at, hx, hy, hz, worlds):
             cx = fma(two, ox, cx)
             cy = fma(two, oy, cy)
             cz = fma(two, oz, cz)
-            rider += LOAD_HEAD + tape[rider + 5]
+            rider += LOAD_HEAD + tape[rider + 4]
         ox, oy, oz = solve(ax, ay, az, bx, by, bz, cx, cy, cz, ex, ey, ez)
         x = x + select(moving, ox, zero)
         y = y + select(moving, oy, zero)
         z = z + select(moving, oz, zero)
-        root = one - dot(x, y, z, x, y, z)
-        root = sqrt(select(root > least, root, least))
+        root = turn_root(x, y, z)
         moving = moving & (dot(ox, oy, oz, ox, oy, oz) > allowed)
         if not any_lane(moving):
             break
     store_vector(s, work + TURN, x, y, z)
     flag = tape[H_UNSETTLED]
     store(s, flag, select(moving, one, load(s, flag)))
-    return x, y, z, root

@@ -15,9 +15,13 @@ three equations (Moser & Veselov 1991; ``cluster_turn``). Impulses follow from d
 places, so that rounding takes no momentum; places have the exact shape, which therefore cannot drift. The
 velocity stage gives all particles V + w x r, loads their motion over the deck besides.
 
-Record: count n, loads k, rows of places (3n), masses (n), masses of loads (k), mass and its inverse, inertia (6), work;
-three corners that carry the frame; n particles; per load: particle, row of minus the start's weights, rows of
-weights, rates and work (arm, r0, r1, motion), count, then arms of its deck. Particles stand as 3p.
+Forces are summed into the mean displacement and the moment once a stage. What a pass adds to them are the impulses of
+contacts and links on the few particles that these touch; the others are placed when the stage ends.
+
+Record: count n of particles, loads k, touched particles, rows of places (3n), masses of loads (k), mass and its
+inverse, inertia (6), work; three corners that carry the frame, as 3p; per particle or load, touched ones first: 3p,
+arm, mass, and the load's work or -1; per load: row of minus the start's weights, rows of weights, rates and work (arm,
+r0, r1, motion), count, then arms of its deck.
 """
 
 from __future__ import annotations
@@ -37,21 +41,26 @@ from ..model.tape import (
     AFTER,
     ARM,
     ARMS,
+    BASE,
     BEFORE,
     CENTRE,
     CLUSTER_HEAD,
+    DELTA,
+    ENTRY,
     H_CLUSTERS,
+    H_FREE,
     H_IMPULSE,
     H_POSITION,
     H_START,
     INERTIA,
     INVERSE,
     LOAD_HEAD,
+    MEAN,
     MOTION,
     SHIFT,
     TURN,
 )
-from .cluster_turn import turn
+from .cluster_turn import cluster_end, cluster_loads, turn, turn_root
 
 
 @inner
@@ -104,7 +113,7 @@ def _mean_arm(tape, s, rider, weights):
     x = zero
     y = zero
     z = zero
-    for k in range(tape[rider + 5]):
+    for k in range(tape[rider + 4]):
         weight = load(s, weights + k)
         ax, ay, az = load_vector(s, tape[rider + LOAD_HEAD + k])
         x = fma(weight, ax, x)
@@ -123,7 +132,7 @@ def cluster_frames(tape, s):
         work = tape[at + 7]
         ex, ey, ez, fx, fy, fz, nx, ny, nz = _axes(tape, s, at)
         for k in range(count):
-            u, v, w = load_vector(s, tape[at + 2] + 3 * k)
+            u, v, w = load_vector(s, tape[at + 3] + 3 * k)
             x = dot(ex, fx, nx, u, v, w)
             y = dot(ey, fy, ny, u, v, w)
             z = dot(ez, fz, nz, u, v, w)
@@ -136,19 +145,19 @@ def cluster_frames(tape, s):
         sx = zero
         sy = zero
         sz = zero
-        rider = at + CLUSTER_HEAD + count
+        rider = cluster_loads(tape, at)
         for k in range(tape[at + 1]):
             m = load(s, tape[at + 4] + k)
-            x, y, z = _mean_arm(tape, s, rider, tape[rider + 1])
+            x, y, z = _mean_arm(tape, s, rider, tape[rider])
             x = zero - x
             y = zero - y
             z = zero - z
-            store_vector(s, tape[rider + 4] + ARM, x, y, z)
+            store_vector(s, tape[rider + 3] + ARM, x, y, z)
             _add_point(s, work + INVERSE, m, x, y, z)
             sx = fma(m, x, sx)
             sy = fma(m, y, sy)
             sz = fma(m, z, sz)
-            rider += LOAD_HEAD + tape[rider + 5]
+            rider += LOAD_HEAD + tape[rider + 4]
         if tape[at + 1] > 0:
             inverse = load(s, tape[at + 5] + 1)
             sx = sx * inverse
@@ -157,16 +166,16 @@ def cluster_frames(tape, s):
             _add_point(s, work + INVERSE, zero - load(s, tape[at + 5]), sx, sy, sz)
             for k in range(count):
                 _move(s, work + ARMS + 3 * k, sx, sy, sz)
-            rider = at + CLUSTER_HEAD + count
+            rider = cluster_loads(tape, at)
             for _ in range(tape[at + 1]):
-                _move(s, tape[rider + 4] + ARM, sx, sy, sz)
-                rider += LOAD_HEAD + tape[rider + 5]
+                _move(s, tape[rider + 3] + ARM, sx, sy, sz)
+                rider += LOAD_HEAD + tape[rider + 4]
         store_vector(s, work + SHIFT, sx, sy, sz)
         symmetric_inverse(s, work + INVERSE, work + INVERSE)
-        x, y, z = _mean(tape, s, at, tape[H_POSITION], -1)
+        x, y, z = _mean(tape, s, at, tape[H_POSITION])
         store_vector(s, work + CENTRE, x, y, z)
         store_vector(s, work + TURN, zero, zero, zero)
-        at = rider
+        at = cluster_end(tape, at)
 
 
 @inner
@@ -177,207 +186,252 @@ def _move(s, row, x, y, z):
 
 
 @inner
-def _place_loads(tape, s, at):
-    """r0 and r1 of every load for the present weights; the shift between the arms of all others."""
-    work = tape[at + 7]
-    x0, y0, z0 = load_vector(s, work + SHIFT)
-    inverse = load(s, tape[at + 5] + 1)
-    dx = x0
-    dy = y0
-    dz = z0
-    rider = at + CLUSTER_HEAD + tape[at]
-    for k in range(tape[at + 1]):
-        own = tape[rider + 4]
-        m = load(s, tape[at + 4] + k)
-        x, y, z = load_vector(s, own + ARM)
-        half = splat(0.5) * m
-        store_vector(s, own + BEFORE, half * (x + x0), half * (y + y0), half * (z + z0))
-        x, y, z = _mean_arm(tape, s, rider, tape[rider + 2])
-        x = x + x0
-        y = y + y0
-        z = z + z0
-        store_vector(s, own + AFTER, x, y, z)
-        share = splat(0.0) - m * inverse
-        dx = fma(share, x, dx)
-        dy = fma(share, y, dy)
-        dz = fma(share, z, dz)
-        rider += LOAD_HEAD + tape[rider + 5]
-    # Arms of loads: less the centre of mass at the end, which is the start's less the shift.
-    rider = at + CLUSTER_HEAD + tape[at]
-    for _ in range(tape[at + 1]):
-        own = tape[rider + 4]
-        _move(s, own + AFTER, x0 - dx, y0 - dy, z0 - dz)
-        ax, ay, az = load_vector(s, own + AFTER)
-        x, y, z = load_vector(s, own + ARM)
-        store_vector(s, own + MOTION, ax - x - dx, ay - y - dy, az - z - dz)
-        rider += LOAD_HEAD + tape[rider + 5]
-    return dx, dy, dz
-
-
-@inner
-def _row(s, target, base, p):
-    """A particle's rows of ``target``, less those of ``base`` if there are any."""
-    x, y, z = load_vector(s, target + p)
-    if base >= 0:
-        a, b, c = load_vector(s, base + p)
-        x = x - a
-        y = y - b
-        z = z - c
-    return x, y, z
-
-
-@inner
-def _mean(tape, s, at, target, base):
-    """Mean of the rows ``target`` less ``base`` weighted by mass."""
+def _mean(tape, s, at, rows):
+    """Mean of a cluster's rows weighted by mass."""
     zero = splat(0.0)
     x = zero
     y = zero
     z = zero
-    for k in range(tape[at]):
-        m = load(s, tape[at + 3] + k)
-        a, b, c = _row(s, target, base, tape[at + CLUSTER_HEAD + k])
+    for k in range(tape[at] + tape[at + 1]):
+        entry = at + CLUSTER_HEAD + ENTRY * k
+        m = load(s, tape[entry + 2])
+        a, b, c = load_vector(s, rows + tape[entry])
         x = fma(m, a, x)
         y = fma(m, b, y)
         z = fma(m, c, z)
-    rider = at + CLUSTER_HEAD + tape[at]
-    for k in range(tape[at + 1]):
-        m = load(s, tape[at + 4] + k)
-        a, b, c = _row(s, target, base, tape[rider])
-        x = fma(m, a, x)
-        y = fma(m, b, y)
-        z = fma(m, c, z)
-        rider += LOAD_HEAD + tape[rider + 5]
     inverse = load(s, tape[at + 5] + 1)
     return x * inverse, y * inverse, z * inverse
 
 
 @inner
-def _moment(tape, s, at, target, base, cx, cy, cz):
-    """Sum of m r x (row less base - c - motion), the motion that of loads over the deck."""
+def _move_loads(tape, s, at, velocity):
+    """Motion of loads over the deck, r0 and r1 of their moment; what they shift the centre by, or its speed."""
     zero = splat(0.0)
-    arms = tape[at + 7] + ARMS
-    lx = zero
-    ly = zero
-    lz = zero
-    for k in range(tape[at]):
-        m = load(s, tape[at + 3] + k)
-        rx, ry, rz = load_vector(s, arms + 3 * k)
-        x, y, z = _row(s, target, base, tape[at + CLUSTER_HEAD + k])
-        x, y, z = cross(rx, ry, rz, x - cx, y - cy, z - cz)
-        lx = fma(m, x, lx)
-        ly = fma(m, y, ly)
-        lz = fma(m, z, lz)
-    rider = at + CLUSTER_HEAD + tape[at]
+    work = tape[at + 7]
+    inverse = load(s, tape[at + 5] + 1)
+    x0, y0, z0 = load_vector(s, work + SHIFT)
+    dx = zero
+    dy = zero
+    dz = zero
+    if not velocity:
+        dx = x0
+        dy = y0
+        dz = z0
+    rider = cluster_loads(tape, at)
     for k in range(tape[at + 1]):
-        own = tape[rider + 4]
+        own = tape[rider + 3]
         m = load(s, tape[at + 4] + k)
-        rx, ry, rz = load_vector(s, own + ARM)
-        x, y, z = _row(s, target, base, tape[rider])
-        ax, ay, az = load_vector(s, own + MOTION)
-        x, y, z = cross(rx, ry, rz, x - cx - ax, y - cy - ay, z - cz - az)
-        lx = fma(m, x, lx)
-        ly = fma(m, y, ly)
-        lz = fma(m, z, lz)
-        rider += LOAD_HEAD + tape[rider + 5]
-    return lx, ly, lz
+        if velocity:
+            x, y, z = _mean_arm(tape, s, rider, tape[rider + 2])
+            store_vector(s, own + MOTION, x, y, z)
+        else:
+            x, y, z = load_vector(s, own + ARM)
+            half = splat(0.5) * m
+            store_vector(s, own + BEFORE, half * (x + x0), half * (y + y0), half * (z + z0))
+            x, y, z = _mean_arm(tape, s, rider, tape[rider + 1])
+            x = x + x0
+            y = y + y0
+            z = z + z0
+            store_vector(s, own + AFTER, x, y, z)
+        share = zero - m * inverse
+        dx = fma(share, x, dx)
+        dy = fma(share, y, dy)
+        dz = fma(share, z, dz)
+        rider += LOAD_HEAD + tape[rider + 4]
+    if not velocity:
+        # Arms of loads: less the centre of mass at the end, which is the start's less the shift.
+        rider = cluster_loads(tape, at)
+        for _ in range(tape[at + 1]):
+            own = tape[rider + 3]
+            _move(s, own + AFTER, x0 - dx, y0 - dy, z0 - dz)
+            ax, ay, az = load_vector(s, own + AFTER)
+            x, y, z = load_vector(s, own + ARM)
+            store_vector(s, own + MOTION, ax - x - dx, ay - y - dy, az - z - dz)
+            rider += LOAD_HEAD + tape[rider + 4]
+    return dx, dy, dz
 
 
 @inner
-def place_clusters(tape, s, target, worlds):
-    """Position stage: put every cluster's particles, moved by all other forces, back in their frame.
+def start_clusters(tape, s, velocity):
+    """What a stage's free rows alone make of every cluster: mean motion and moment, without impulses.
 
-    Their impulse rows become those of the whole motion, rods and riders included. Frames of other ``worlds``
-    than those in the mask keep their rotation.
+    Arms sum to zero with the masses as weights, so the moment needs no centre.
     """
     zero = splat(0.0)
-    half = splat(0.5)
-    two = splat(2.0)
     at = tape[H_CLUSTERS] + 1
     for _ in range(tape[tape[H_CLUSTERS]]):
         work = tape[at + 7]
-        dx, dy, dz = _place_loads(tape, s, at)
-        ux, uy, uz = _mean(tape, s, at, target, tape[H_START])
-        ux = ux + dx
-        uy = uy + dy
-        uz = uz + dz
-        lx, ly, lz = _moment(tape, s, at, target, tape[H_START], ux, uy, uz)
-        x, y, z, root = turn(tape, s, at, half * lx, half * ly, half * lz, worlds)
-        # R - 1 = 2 (q0 [q] + q q^T - q.q).
-        square = zero - dot(x, y, z, x, y, z)
-        d00 = two * fma(x, x, square)
-        d11 = two * fma(y, y, square)
-        d22 = two * fma(z, z, square)
-        d01 = two * fma(x, y, zero - root * z)
-        d10 = two * fma(x, y, root * z)
-        d02 = two * fma(x, z, root * y)
-        d20 = two * fma(x, z, zero - root * y)
-        d12 = two * fma(y, z, zero - root * x)
-        d21 = two * fma(y, z, root * x)
-        cx, cy, cz = load_vector(s, work + CENTRE)
-        rider = at + CLUSTER_HEAD + tape[at]
+        dx, dy, dz = _move_loads(tape, s, at, velocity)
+        store_vector(s, work + DELTA, dx, dy, dz)
+        ux = zero
+        uy = zero
+        uz = zero
+        lx = zero
+        ly = zero
+        lz = zero
         for k in range(tape[at] + tape[at + 1]):
-            if k < tape[at]:
-                p = tape[at + CLUSTER_HEAD + k]
-                m = load(s, tape[at + 3] + k)
-                rx, ry, rz = load_vector(s, work + ARMS + 3 * k)
-                mx = ux
-                my = uy
-                mz = uz
-                ex = rx + dx
-                ey = ry + dy
-                ez = rz + dz
-            else:
-                p = tape[rider]
-                m = load(s, tape[at + 4] + k - tape[at])
-                own = tape[rider + 4]
-                rx, ry, rz = load_vector(s, own + ARM)
-                ex, ey, ez = load_vector(s, own + AFTER)
-                mx, my, mz = load_vector(s, own + MOTION)
-                mx = ux + mx
-                my = uy + my
-                mz = uz + mz
-                rider += LOAD_HEAD + tape[rider + 5]
-            mx = mx + dot(d00, d01, d02, ex, ey, ez)
-            my = my + dot(d10, d11, d12, ex, ey, ez)
-            mz = mz + dot(d20, d21, d22, ex, ey, ez)
-            x, y, z = _row(s, target, tape[H_START], p)
-            row = tape[H_IMPULSE] + p
-            ox, oy, oz = load_vector(s, row)
-            store_vector(s, row, fma(m, mx - x, ox), fma(m, my - y, oy), fma(m, mz - z, oz))
-            store_vector(s, target + p, cx + (rx + mx), cy + (ry + my), cz + (rz + mz))
-        at = rider
+            entry = at + CLUSTER_HEAD + ENTRY * k
+            p = tape[entry]
+            m = load(s, tape[entry + 2])
+            x, y, z = load_vector(s, tape[H_FREE] + p)
+            if not velocity:
+                a, b, c = load_vector(s, tape[H_START] + p)
+                x = x - a
+                y = y - b
+                z = z - c
+            ux = fma(m, x, ux)
+            uy = fma(m, y, uy)
+            uz = fma(m, z, uz)
+            if tape[entry + 3] >= 0:
+                a, b, c = load_vector(s, tape[entry + 3] + MOTION)
+                x = x - a
+                y = y - b
+                z = z - c
+            rx, ry, rz = load_vector(s, tape[entry + 1])
+            x, y, z = cross(rx, ry, rz, x, y, z)
+            lx = fma(m, x, lx)
+            ly = fma(m, y, ly)
+            lz = fma(m, z, lz)
+        inverse = load(s, tape[at + 5] + 1)
+        store_vector(
+            s, work + BASE, fma(inverse, ux, dx), fma(inverse, uy, dy), fma(inverse, uz, dz)
+        )
+        store_vector(s, work + BASE + 3, lx, ly, lz)
+        at = cluster_end(tape, at)
 
 
 @inner
-def move_clusters(tape, s, target):
-    """Velocity stage: give every cluster's particles the velocities of one frame."""
+def _pushed(tape, s, at):
+    """Mean motion and moment with the impulses on touched particles."""
+    work = tape[at + 7]
+    inverse = load(s, tape[at + 5] + 1)
+    ux, uy, uz = load_vector(s, work + BASE)
+    lx, ly, lz = load_vector(s, work + BASE + 3)
+    for k in range(tape[at + 2]):
+        entry = at + CLUSTER_HEAD + ENTRY * k
+        x, y, z = load_vector(s, tape[H_IMPULSE] + tape[entry])
+        ux = fma(inverse, x, ux)
+        uy = fma(inverse, y, uy)
+        uz = fma(inverse, z, uz)
+        rx, ry, rz = load_vector(s, tape[entry + 1])
+        x, y, z = cross(rx, ry, rz, x, y, z)
+        lx = lx + x
+        ly = ly + y
+        lz = lz + z
+    return ux, uy, uz, lx, ly, lz
+
+
+@inner
+def _place(tape, s, at, target, count, finish):
+    """Positions of the first ``count`` entries in the frame.
+
+    To ``finish``, their impulse rows become those of the whole motion.
+    """
     zero = splat(0.0)
+    two = splat(2.0)
+    work = tape[at + 7]
+    x, y, z = load_vector(s, work + TURN)
+    root = turn_root(x, y, z)
+    ux, uy, uz = load_vector(s, work + MEAN)
+    dx, dy, dz = load_vector(s, work + DELTA)
+    cx, cy, cz = load_vector(s, work + CENTRE)
+    # R - 1 = 2 (q0 [q] + q q^T - q.q).
+    square = zero - dot(x, y, z, x, y, z)
+    d00 = two * fma(x, x, square)
+    d11 = two * fma(y, y, square)
+    d22 = two * fma(z, z, square)
+    d01 = two * fma(x, y, zero - root * z)
+    d10 = two * fma(x, y, root * z)
+    d02 = two * fma(x, z, root * y)
+    d20 = two * fma(x, z, zero - root * y)
+    d12 = two * fma(y, z, zero - root * x)
+    d21 = two * fma(y, z, root * x)
+    for k in range(count):
+        entry = at + CLUSTER_HEAD + ENTRY * k
+        p = tape[entry]
+        own = tape[entry + 3]
+        rx, ry, rz = load_vector(s, tape[entry + 1])
+        mx = ux
+        my = uy
+        mz = uz
+        if own < 0:
+            ex = rx + dx
+            ey = ry + dy
+            ez = rz + dz
+        else:
+            ex, ey, ez = load_vector(s, own + AFTER)
+            x, y, z = load_vector(s, own + MOTION)
+            mx = mx + x
+            my = my + y
+            mz = mz + z
+        mx = mx + dot(d00, d01, d02, ex, ey, ez)
+        my = my + dot(d10, d11, d12, ex, ey, ez)
+        mz = mz + dot(d20, d21, d22, ex, ey, ez)
+        store_vector(s, target + p, cx + (rx + mx), cy + (ry + my), cz + (rz + mz))
+        if finish:
+            m = load(s, tape[entry + 2])
+            x, y, z = load_vector(s, tape[H_FREE] + p)
+            a, b, c = load_vector(s, tape[H_START] + p)
+            x = m * (mx - (x - a))
+            y = m * (my - (y - b))
+            z = m * (mz - (z - c))
+            store_vector(s, tape[H_IMPULSE] + p, x, y, z)
+
+
+@inner
+def _spread(tape, s, at, target, count):
+    """Velocities of the first ``count`` entries from the frame's."""
+    work = tape[at + 7]
+    vx, vy, vz = load_vector(s, work + MEAN)
+    wx, wy, wz = load_vector(s, work + TURN)
+    for k in range(count):
+        entry = at + CLUSTER_HEAD + ENTRY * k
+        rx, ry, rz = load_vector(s, tape[entry + 1])
+        x, y, z = cross(wx, wy, wz, rx, ry, rz)
+        x = x + vx
+        y = y + vy
+        z = z + vz
+        if tape[entry + 3] >= 0:
+            a, b, c = load_vector(s, tape[entry + 3] + MOTION)
+            x = x + a
+            y = y + b
+            z = z + c
+        store_vector(s, target + tape[entry], x, y, z)
+
+
+@inner
+def place_clusters(tape, s, target, velocity, worlds):
+    """Move every cluster as the impulses at hand make it, and put its touched particles in their frame.
+
+    Frames of other ``worlds`` than those in the mask keep their rotation.
+    """
+    half = splat(0.5)
     at = tape[H_CLUSTERS] + 1
     for _ in range(tape[tape[H_CLUSTERS]]):
         work = tape[at + 7]
-        cx, cy, cz = _mean(tape, s, at, target, -1)
-        inverse = load(s, tape[at + 5] + 1)
-        rider = at + CLUSTER_HEAD + tape[at]
-        for k in range(tape[at + 1]):
-            share = zero - load(s, tape[at + 4] + k) * inverse
-            x, y, z = _mean_arm(tape, s, rider, tape[rider + 3])
-            store_vector(s, tape[rider + 4] + MOTION, x, y, z)
-            cx = fma(share, x, cx)
-            cy = fma(share, y, cy)
-            cz = fma(share, z, cz)
-            rider += LOAD_HEAD + tape[rider + 5]
-        lx, ly, lz = _moment(tape, s, at, target, -1, cx, cy, cz)
-        wx, wy, wz = symmetric_product(s, work + INVERSE, lx, ly, lz)
-        for k in range(tape[at]):
-            rx, ry, rz = load_vector(s, work + ARMS + 3 * k)
-            vx, vy, vz = cross(wx, wy, wz, rx, ry, rz)
-            store_vector(s, target + tape[at + CLUSTER_HEAD + k], cx + vx, cy + vy, cz + vz)
-        rider = at + CLUSTER_HEAD + tape[at]
-        for _ in range(tape[at + 1]):
-            own = tape[rider + 4]
-            rx, ry, rz = load_vector(s, own + ARM)
-            vx, vy, vz = cross(wx, wy, wz, rx, ry, rz)
-            x, y, z = load_vector(s, own + MOTION)
-            store_vector(s, target + tape[rider], cx + vx + x, cy + vy + y, cz + vz + z)
-            rider += LOAD_HEAD + tape[rider + 5]
-        at = rider
+        ux, uy, uz, lx, ly, lz = _pushed(tape, s, at)
+        store_vector(s, work + MEAN, ux, uy, uz)
+        if velocity:
+            wx, wy, wz = symmetric_product(s, work + INVERSE, lx, ly, lz)
+            store_vector(s, work + TURN, wx, wy, wz)
+            _spread(tape, s, at, target, tape[at + 2])
+        else:
+            turn(tape, s, at, half * lx, half * ly, half * lz, worlds)
+            _place(tape, s, at, target, tape[at + 2], False)
+        at = cluster_end(tape, at)
+
+
+@inner
+def finish_clusters(tape, s, target, velocity):
+    """Put all particles of every cluster where the last pass moved it.
+
+    After positions, their impulse rows become those of the whole motion, rods and riders included.
+    """
+    at = tape[H_CLUSTERS] + 1
+    for _ in range(tape[tape[H_CLUSTERS]]):
+        count = tape[at] + tape[at + 1]
+        if velocity:
+            _spread(tape, s, at, target, count)
+        else:
+            _place(tape, s, at, target, count, True)
+        at = cluster_end(tape, at)

@@ -229,15 +229,29 @@ class Clusters:
         work = c.take(ARMS + 3 * count)
         self.arms |= {p: work + ARMS + 3 * k for k, p in enumerate(members)}
         self.inverses.append((total + 1, work + INVERSE))
-        record = [
-            count, len(riders), given, given + 3 * count, given + 4 * count, total, total + 2, work,
-            *(3 * members[k] for k in corners), *(3 * p for p in members),
-        ]  # fmt: skip
-        for rider in riders:
+        entries = [
+            [3 * p, work + ARMS + 3 * k, given + 3 * count + k, -1] for k, p in enumerate(members)
+        ]
+        loads: list[int] = []
+        for k, rider in enumerate(riders):
             load, own = c.of(rider.particle), c.take(LOAD_ROWS)
-            record += [
-                3 * load, c.held[id(rider)], c.place(rider, "weights"), c.place(rider, "rates"), own,
+            loads += [
+                c.held[id(rider)], c.place(rider, "weights"), c.place(rider, "rates"), own,
                 len(rider.deck), *(self.arms[c.of(p)] for p in rider.deck),
             ]  # fmt: skip
             self.arms[load] = own
-        return record
+            entries.append([3 * load, own, given + 4 * count + k, own])
+        touched = self._touched()
+        entries.sort(key=lambda entry: entry[0] // 3 not in touched)
+        return [
+            count, len(riders), sum(entry[0] // 3 in touched for entry in entries), given,
+            given + 4 * count, total, total + 2, work, *(3 * members[k] for k in corners),
+            *(word for entry in entries for word in entry), *loads,
+        ]  # fmt: skip
+
+    def _touched(self) -> set[int]:
+        """Particles that rows of the matrix act on."""
+        c = self.c
+        ends = [p for _, a, b, _ in c.contacts for p in (a, b)]
+        ends += [p for thing in (*c.links, *c.riders) for p in c.scene.touched(thing)]
+        return {c.of(p) for p in ends if p is not None}

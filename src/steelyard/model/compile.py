@@ -307,8 +307,11 @@ class Compiler:
 
     def _network(self) -> None:
         """Sparse matrix of the direct solver."""
+        clustered: dict[int, int] = {}
         if self.network is not None and self.header["constrained"]:
             self.network.build()
+            clustered = self.network.clusters.of
+        self.sections["singles"] = [p for p in range(len(self.particles)) if p not in clustered]
         self.header["given_up"] = self.take(1)
         self.header["blocks"] = self.model.blocks
         self.header["ends"] = self.model.blocks + tape.WORDS

@@ -33,6 +33,7 @@ from __future__ import annotations
     H_VALUES,
     H_CONTACTS_MOST,
     H_RECIPE,
+    H_SINGLES,
     H_PASSES,
     H_TOLERANCE,
     H_CONSTRAINED,
@@ -78,18 +79,19 @@ from __future__ import annotations
     H_GUESS,
     H_MASK,
     H_USED_MASK,
-) = range(69)
-HEADER = 69
+) = range(70)
+HEADER = 70
 
 # Width of the records of links and contacts; ``model.compile`` writes them field by field.
 LINK = 17
 CONTACT = 24
 
-# Records of clusters and of loads on them: what comes before their lists of particles. Work rows of a cluster: inertia,
-# inverse of that with loads, quaternion, shift of the centre by loads, centre, arms; of a load: its arm, r0 and r1 of
-# the moment's equation, motion over the deck.
-CLUSTER_HEAD, LOAD_HEAD = 11, 6
-INERTIA, INVERSE, TURN, SHIFT, CENTRE, ARMS = 0, 6, 12, 15, 18, 21
+# Records of clusters and of loads on them: what comes before their lists, and an entry of a cluster's. Work rows of a
+# cluster: inertia, inverse of that with loads, quaternion (angular velocity in the velocity stage), shift of the centre
+# by loads at the start and at the end, centre, mean motion and moment without impulses, mean motion, arms; of a load:
+# its arm, r0 and r1 of the moment's equation, motion over the deck.
+CLUSTER_HEAD, ENTRY, LOAD_HEAD = 11, 4, 5
+INERTIA, INVERSE, TURN, SHIFT, CENTRE, DELTA, BASE, MEAN, ARMS = 0, 6, 12, 15, 18, 21, 24, 30, 33
 ARM, BEFORE, AFTER, MOTION, LOAD_ROWS = 0, 3, 6, 9, 12
 
 # Words behind the flags of blocks in ``skip``, from H_BLOCKS on: whether the factor at hand is not of the step's start,

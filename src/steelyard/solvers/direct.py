@@ -14,7 +14,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from ..constraints.clusters import move_clusters, place_clusters
+from ..constraints.clusters import finish_clusters, place_clusters, start_clusters
 from ..constraints.contacts import (
     contact_gap,
     contact_multiplier,
@@ -31,7 +31,6 @@ from ..model.tape import (
     H_BACKWARD,
     H_BLOCKS,
     H_CABLES,
-    H_CLUSTERS,
     H_CONTACTS,
     H_DT,
     H_FORWARD,
@@ -241,11 +240,7 @@ def _accept(tape, s, skip, velocity, worlds):
 def _apply(tape, s, skip, velocity, target, worlds):
     """Rows ``target`` as the multipliers at hand, changed in ``worlds``, and the rigid clusters make them."""
     gather(tape, s, skip, velocity, target)
-    if tape[tape[H_CLUSTERS]] > 0:
-        if velocity:
-            move_clusters(tape, s, target)
-        else:
-            place_clusters(tape, s, target, worlds)
+    place_clusters(tape, s, target, velocity, worlds)
 
 
 @inner
@@ -262,6 +257,7 @@ def solve_stage(tape, s, skip, velocity, dt, target, hasty):
     if velocity:
         clear_velocity_multipliers(tape, s)
     _link_start(tape, s, velocity)
+    start_clusters(tape, s, velocity)
     _apply(tape, s, skip, velocity, target, zero >= zero)
     _contact_start(tape, s, skip, velocity)
     contacts = tape[tape[H_CONTACTS]]
@@ -322,6 +318,7 @@ def solve_stage(tape, s, skip, velocity, dt, target, hasty):
             # Velocities are linear and nothing can go slack: one solve is exact.
             bad = stuck
             break
+    finish_clusters(tape, s, target, velocity)
     bad = bad | lost
     store(s, tape[H_UNSETTLED], select(bad, splat(1.0), load(s, tape[H_UNSETTLED])))
 

@@ -16,6 +16,7 @@ from ..model.tape import (
     H_LINKS,
     H_PARTICLES,
     H_RIDERS,
+    H_SINGLES,
     LINK,
 )
 
@@ -40,7 +41,10 @@ def clear_velocity_multipliers(tape, s):
 
 @inner
 def gather(tape, s, skip, velocity, target):
-    """Sum all impulses and apply them: rows ``target`` = free rows + M^-1 impulse."""
+    """Sum all impulses and apply them: rows ``target`` = free rows + M^-1 impulse.
+
+    Particles of rigid clusters are moved by these, see ``constraints.clusters``.
+    """
     zero = splat(0.0)
     count = 3 * tape[H_PARTICLES]
     for row in range(count + 3):
@@ -48,7 +52,9 @@ def gather(tape, s, skip, velocity, target):
     link_impulses(tape, s, velocity)
     rider_impulses(tape, s, velocity)
     contact_impulses(tape, s, skip, velocity)
-    for p in range(tape[H_PARTICLES]):
+    at = tape[H_SINGLES]
+    for index in range(tape[at]):
+        p = tape[at + 1 + index]
         inverse = load(s, tape[H_INVERSE_MASS] + p)
         for component in range(3):
             row = 3 * p + component
