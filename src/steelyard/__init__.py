@@ -4,6 +4,7 @@ from . import draw, scenes
 from .integrators.closed_form import ClosedForm, flight, flight_fall_time, flight_impact
 from .integrators.explicit_euler import ExplicitEuler
 from .integrators.rattle import Rattle
+from .integrators.rk4 import RungeKutta4
 from .integrators.symplectic_euler import SymplecticEuler
 from .kernel import inner, kernel
 from .math.random import normal, uniform, uniform_between
@@ -52,6 +53,7 @@ __all__ = [
     "Rider",
     "Rod",
     "RodConstraint",
+    "RungeKutta4",
     "Scene",
     "Spring",
     "StiffSpring",

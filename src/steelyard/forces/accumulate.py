@@ -5,7 +5,9 @@ from __future__ import annotations
 from ..kernel import inner
 from ..math.lanes import load, splat, store
 from ..model.tape import H_FORCE, H_FORCED, H_PARTICLES, H_USER_FORCES
+from ..stage import stage
 from .buoyancy import add_buoyancy
+from .drag import add_drag
 from .gravity import add_gravity
 from .springs import add_springs
 
@@ -26,3 +28,10 @@ def accumulate_forces(tape, s):
         for row in range(3 * tape[H_PARTICLES]):
             f = tape[H_FORCE] + row
             store(s, f, load(s, f) + load(s, given + row))
+
+
+@stage
+def sum_forces(tape, s, skip, part):
+    """All forces at the state at hand, drag too."""
+    accumulate_forces(tape, s)
+    add_drag(tape, s)

@@ -45,7 +45,7 @@ class Model:
         start: (state rows,) state at time 0.
         parameters: assignable values and the rows that follow from them.
         places: first state row and size of what varies, by (thing, name).
-        recipe: stages of a step in order, each with its half.
+        recipe: stages of a step in order, each with its part.
         blocks: number of matrix blocks.
         skip: entries of the flags of blocks and what stands behind them.
     """
@@ -264,12 +264,15 @@ class Compiler:
                 )
 
             self.header["damping"] = self.slot(3 * count, (damping_key,), phis)
+        elif method.integrator.smooth:
+            self.header["damping"] = self.slot(count, (damping_key,), derived.rate)
         else:
             self.header["damping"] = self.slot(
                 count, (damping_key,), lambda value: derived.decay(value, share)
             )
         self.header["damped"] = int(any(p.damping != 1.0 for p in self.particles))
-        stiff = {id(spring.particle) for spring in self.scene.of(StiffSpring)}
+        flows = [] if method.integrator.smooth else self.scene.of(StiffSpring)
+        stiff = {id(spring.particle) for spring in flows}
         self.sections["drift"] = [p for p, x in enumerate(self.particles) if id(x) not in stiff]
         self.header["dt"] = self.constant(method.dt)
 
@@ -282,8 +285,9 @@ class Compiler:
         solver = self.method.solver
         held = solver if self.header["constrained"] else None
         recipe = self.method.integrator.recipe(held)
-        self.sections["recipe"] = [word for part, half in recipe for word in (part.address, half)]
+        self.sections["recipe"] = [word for stage, part in recipe for word in (stage.address, part)]
         self.model.recipe = recipe
+        self.header["work"] = self.take(self.method.integrator.work * len(self.particles))
         self.header["hasty"] = int(bool(held and held.sparse and self.contacts))
         self.header["contacts_most"] = most = len(self.links) + len(self.contacts)
         self.header["values"] = -1

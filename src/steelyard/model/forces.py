@@ -24,14 +24,20 @@ if TYPE_CHECKING:
     from .compile import Compiler
 
 
+_PLAIN = ("anchor", "stiffness", "damping")
+
+
 def add_forces(c: Compiler) -> None:
     """Force rows and a record per force."""
     scene = c.scene
     drags = scene.of(Drag)
-    explicit = c.method.integrator.sums_drag
-    summed = scene.of(
-        Spring, Bungee, AnchoredSpring, AnchoredBungee, Gravity, Buoyancy, UserForce
-    ) or (drags and explicit)
+    integrator = c.method.integrator
+    stiff_springs = scene.of(StiffSpring)
+    summed = (
+        scene.of(Spring, Bungee, AnchoredSpring, AnchoredBungee, Gravity, Buoyancy, UserForce)
+        or (drags and integrator.sums_drag)
+        or (stiff_springs and integrator.smooth)
+    )
     c.header["forced"] = int(bool(summed))
     force = c.take(3 * len(c.particles) + 3) if summed else -1
     c.header["force"] = force
@@ -79,7 +85,7 @@ def add_forces(c: Compiler) -> None:
         p = float_.particle
         y, f = c.at("position", p) + 1, c.at("force", p) + 1
         c.sections["buoyancies"] += [y, f, surface, half, lift]
-    share = c.method.integrator.damping_share * c.method.dt
+    share = integrator.damping_share * c.method.dt
     c.sections["drags"] = []
     for drag in drags:
         linear = c.parameter(drag, "linear", drag.linear)
@@ -98,12 +104,23 @@ def add_forces(c: Compiler) -> None:
                     c.at("velocity", p), f, linear, quadratic, wind, flow, flow + 1,
                 ]  # fmt: skip
     c.sections["stiff_springs"] = []
-    for stiff in scene.of(StiffSpring):
-        if stiff.particle.movable:
-            _stiff_spring(c, stiff)
-        else:
-            for name in ("anchor", "stiffness", "damping"):
+    for stiff in stiff_springs:
+        if not stiff.particle.movable:
+            for name in _PLAIN:
                 c.parameters.declare((stiff, name), getattr(stiff, name))
+        elif integrator.smooth:
+            _plain_spring(c, stiff, spare)
+        else:
+            _stiff_spring(c, stiff)
+
+
+def _plain_spring(c: Compiler, spring: StiffSpring, spare: int) -> None:
+    """A stiff spring as an anchored spring of no rest length and a drag in still air."""
+    p = spring.particle
+    x, v, f = (c.at(name, p) for name in ("position", "velocity", "force"))
+    rows = {name: c.parameter(spring, name, getattr(spring, name)) for name in _PLAIN}
+    c.sections["springs"] += [x, rows["anchor"], f, spare, rows["stiffness"], c.zero, 0]
+    c.sections["drags"] += [v, f, rows["damping"], c.zero, c.zero, -1, -1]
 
 
 def _stiff_spring(c: Compiler, spring: StiffSpring) -> None:

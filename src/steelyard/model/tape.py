@@ -78,8 +78,9 @@ from __future__ import annotations
     H_GUESS,
     H_MASK,
     H_USED_MASK,
-) = range(69)
-HEADER = 69
+    H_WORK,
+) = range(70)
+HEADER = 70
 
 # Width of the records of links and contacts; ``model.compile`` writes them field by field.
 LINK = 17
