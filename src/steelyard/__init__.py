@@ -1,8 +1,11 @@
 """Steelyard: a batched physics engine that lets you weigh speed against accuracy."""
 
 from . import draw, scenes
+from .integrators.backward_euler import BackwardEuler
 from .integrators.closed_form import ClosedForm, flight, flight_fall_time, flight_impact
 from .integrators.explicit_euler import ExplicitEuler
+from .integrators.implicit_midpoint import ImplicitMidpoint
+from .integrators.linearly_implicit import LinearlyImplicit
 from .integrators.rattle import Rattle
 from .integrators.rk4 import RungeKutta4
 from .integrators.symplectic_euler import SymplecticEuler
@@ -34,6 +37,7 @@ from .world import World
 __all__ = [
     "AnchoredBungee",
     "AnchoredSpring",
+    "BackwardEuler",
     "Bungee",
     "Buoyancy",
     "Cable",
@@ -46,7 +50,9 @@ __all__ = [
     "GaussSeidel",
     "Gravity",
     "Ground",
+    "ImplicitMidpoint",
     "LinePlatform",
+    "LinearlyImplicit",
     "Method",
     "Particle",
     "Rattle",

@@ -48,11 +48,12 @@ class Method:
         checks.instance("Method", "integrator", self.integrator, Integrator, remedy="Use Rattle().")
         if self.solver is not None:
             checks.instance("Method", "solver", self.solver, Solver, remedy="Use Direct().")
-        owner = type(self.solver).__name__
-        for name, least in (("passes", 1), ("iterations", 0)):
-            count = getattr(self.solver, name, least)
-            checks.whole(owner, name, count, least=least, remedy="Give a count.")
-        checks.number(owner, "tolerance", getattr(self.solver, "tolerance", 1.0), _TOLERANCE)
+        for part in (self.integrator, self.solver):
+            owner = type(part).__name__
+            for name, least in (("passes", 1), ("iterations", 0)):
+                count = getattr(part, name, least)
+                checks.whole(owner, name, count, least=least, remedy="Give a count.")
+            checks.number(owner, "tolerance", getattr(part, "tolerance", 1.0), _TOLERANCE)
 
     def refuse(self, scene: Scene) -> None:
         """Raise if this method cannot do what a scene holds.

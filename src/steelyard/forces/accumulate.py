@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from ..kernel import inner
-from ..math.lanes import load, splat, store
-from ..model.tape import H_FORCE, H_FORCED, H_PARTICLES, H_USER_FORCES
+from ..math.lanes import any_lane, load, splat, store
+from ..model.tape import H_ACTIVE, H_FORCE, H_FORCED, H_PARTICLES, H_USER_FORCES
 from ..stage import stage
 from .buoyancy import add_buoyancy
 from .drag import add_drag
@@ -32,6 +32,7 @@ def accumulate_forces(tape, s):
 
 @stage
 def sum_forces(tape, s, skip, part):
-    """All forces at the state at hand, drag too."""
-    accumulate_forces(tape, s)
-    add_drag(tape, s)
+    """All forces at the state at hand, drag too; nothing where no world is active."""
+    if any_lane(load(s, tape[H_ACTIVE]) > splat(0.5)):
+        accumulate_forces(tape, s)
+        add_drag(tape, s)

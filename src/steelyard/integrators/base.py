@@ -26,6 +26,8 @@ class Integrator:
     flies: ClassVar[bool] = False
     #: When user-written forces are evaluated, as a share of the step, before each part of it; none where they cannot be.
     evaluations: ClassVar[tuple[float, ...]] = (0.0,)
+    #: Share of the step by which implicit methods reach ahead: their matrix is M - r D - r^2 K with r = reach dt.
+    reach: ClassVar[float] = 0.0
     #: Scratch rows per particle that it works in.
     work: ClassVar[int] = 0
     #: Whether it works with a solver of displacements and velocities (True), of impulses (False).

@@ -25,6 +25,7 @@ from . import derived, tape
 from .constraints import add_contacts, add_links, add_riders
 from .forces import add_forces
 from .network import Network
+from .stiffness import Stiffness
 from .parameters import PARTICLES, Key, Parameters, Slot
 from .tape import CONTACT, HEADER, LINK
 
@@ -80,10 +81,12 @@ class Compiler:
         self.header: dict[str, int] = {}
         self.sections: dict[str, list[int]] = {}
         self.counts: dict[str, int] = {}
+        #: Movable ends of every record of the springs' section.
+        self.spring_ends: list[tuple[int | None, int | None]] = []
         self.widths = {
             "springs": 7, "gravities": 3, "buoyancies": 5, "drags": 7, "stiff_springs": 8, "drift": 1,
             "winches": 3, "movers": 5, "links": LINK, "contacts": CONTACT, "generators": 2,
-            "recipe": 2,
+            "recipe": 2, "unknowns": 4, "spring_blocks": 9, "drag_blocks": 1, "float_blocks": 4,
         }  # fmt: skip
         self.next_row = 0
         self.start: list[float] = []
@@ -287,15 +290,20 @@ class Compiler:
         recipe = self.method.integrator.recipe(held)
         self.sections["recipe"] = [word for stage, part in recipe for word in (stage.address, part)]
         self.model.recipe = recipe
-        self.header["work"] = self.take(self.method.integrator.work * len(self.particles))
         self.header["hasty"] = int(bool(held and held.sparse and self.contacts))
         self.header["contacts_most"] = most = len(self.links) + len(self.contacts)
         self.header["values"] = -1
         if held is not None and not held.staged:
             self.header["values"] = self.take(-(-12 * most // LANES))
-        limit = getattr(solver, "passes", None)
-        self.header["passes"] = getattr(solver, "iterations", 0) if limit is None else limit
-        self.header["tolerance"] = self.constant(getattr(solver, "tolerance", 0.0))
+        settings = solver if held is not None else self.method.integrator
+        limit = getattr(settings, "passes", None)
+        self.header["passes"] = getattr(settings, "iterations", 0) if limit is None else limit
+        self.header["tolerance"] = self.constant(getattr(settings, "tolerance", 0.0))
+        iterates = hasattr(self.method.integrator, "passes")
+        self.header["active"] = self.take(1) if iterates else self.one
+        self.header["work"] = self.take(self.method.integrator.work * len(self.particles))
+        if self.method.integrator.reach > 0.0:
+            Stiffness(self).build()
         generators: list[int] = []
         link = contact = 0
         for thing in self.scene.things:

@@ -17,6 +17,7 @@ from ..scene.forces import (
     StiffSpring,
     UserForce,
 )
+from ..scene.particle import Particle
 from . import derived
 from .parameters import PARTICLES
 
@@ -25,6 +26,10 @@ if TYPE_CHECKING:
 
 
 _PLAIN = ("anchor", "stiffness", "damping")
+
+
+def _movable(c: Compiler, particle: Particle) -> int | None:
+    return c.of(particle) if particle.movable else None
 
 
 def add_forces(c: Compiler) -> None:
@@ -49,8 +54,10 @@ def add_forces(c: Compiler) -> None:
         if isinstance(spring, AnchoredSpring):
             a, b = spring.particle, c.parameter(spring, "anchor", spring.anchor)
             end = spare
+            c.spring_ends.append((_movable(c, a), None))
         else:
             a, b, end = spring.a, c.at("position", spring.b), c.at("force", spring.b)
+            c.spring_ends.append((_movable(c, a), _movable(c, spring.b)))
         single = int(isinstance(spring, Bungee | AnchoredBungee))
         springs += [
             c.at("position", a),
@@ -120,6 +127,7 @@ def _plain_spring(c: Compiler, spring: StiffSpring, spare: int) -> None:
     x, v, f = (c.at(name, p) for name in ("position", "velocity", "force"))
     rows = {name: c.parameter(spring, name, getattr(spring, name)) for name in _PLAIN}
     c.sections["springs"] += [x, rows["anchor"], f, spare, rows["stiffness"], c.zero, 0]
+    c.spring_ends.append((c.of(p), None))
     c.sections["drags"] += [v, f, rows["damping"], c.zero, c.zero, -1, -1]
 
 

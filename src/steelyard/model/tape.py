@@ -79,8 +79,15 @@ from __future__ import annotations
     H_MASK,
     H_USED_MASK,
     H_WORK,
-) = range(70)
-HEADER = 70
+    H_ACTIVE,
+    H_REACH,
+    H_MASS,
+    H_UNKNOWNS,
+    H_SPRING_BLOCKS,
+    H_DRAG_BLOCKS,
+    H_FLOAT_BLOCKS,
+) = range(77)
+HEADER = 77
 
 # Width of the records of links and contacts; ``model.compile`` writes them field by field.
 LINK = 17
