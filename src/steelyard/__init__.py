@@ -4,6 +4,7 @@ from . import draw, scenes
 from .integrators.backward_euler import BackwardEuler
 from .integrators.closed_form import ClosedForm, flight, flight_fall_time, flight_impact
 from .integrators.explicit_euler import ExplicitEuler
+from .integrators.exponential import ExponentialRungeKutta
 from .integrators.implicit_midpoint import ImplicitMidpoint
 from .integrators.linearly_implicit import LinearlyImplicit
 from .integrators.rattle import Rattle
@@ -48,6 +49,7 @@ __all__ = [
     "Drag",
     "ExplicitEuler",
     "GaussSeidel",
+    "ExponentialRungeKutta",
     "Gravity",
     "Ground",
     "ImplicitMidpoint",

@@ -22,6 +22,8 @@ class Integrator:
     #: Whether it takes the acceleration as one function of place and speed: damping as a rate, drag and stiff springs as
     #: forces like all others.
     smooth: ClassVar[bool] = False
+    #: Whether what is linear in one particle (anchored springs, damping, drag) is a flow of its own.
+    linear: ClassVar[bool] = False
     #: Whether it needs closed forms of damping instead of powers.
     flies: ClassVar[bool] = False
     #: When user-written forces are evaluated, as a share of the step, before each part of it; none where they cannot be.

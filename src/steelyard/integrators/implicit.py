@@ -93,7 +93,7 @@ def _add_springs(tape, s, reach):
         inverse = select(apart, inverse, zero)
         rest = load(s, tape[k + 5])
         stiffness = load(s, tape[k + 4])
-        if tape[k + 6] != 0:
+        if tape[k + 6] == springs.ONE_SIDED:
             stiffness = select(rest * inverse < one, stiffness, zero)
             stiffness = select(apart, stiffness, zero)
         across = stiffness * (one - rest * inverse)

@@ -25,6 +25,7 @@ from . import derived, tape
 from .constraints import add_contacts, add_links, add_riders
 from .forces import add_forces
 from .network import Network
+from .propagators import add_propagators
 from .stiffness import Stiffness
 from .parameters import PARTICLES, Key, Parameters, Slot
 from .tape import CONTACT, HEADER, LINK
@@ -83,10 +84,13 @@ class Compiler:
         self.counts: dict[str, int] = {}
         #: Movable ends of every record of the springs' section.
         self.spring_ends: list[tuple[int | None, int | None]] = []
+        #: Forces that are linear in one particle: the thing, its parameter that brakes, whether it is a spring.
+        self.linear: dict[int, list[tuple[Any, str | None, bool]]] = {}
         self.widths = {
             "springs": 7, "gravities": 3, "buoyancies": 5, "drags": 7, "stiff_springs": 8, "drift": 1,
             "winches": 3, "movers": 5, "links": LINK, "contacts": CONTACT, "generators": 2,
             "recipe": 2, "unknowns": 4, "spring_blocks": 9, "drag_blocks": 1, "float_blocks": 4,
+            "propagators": 2,
         }  # fmt: skip
         self.next_row = 0
         self.start: list[float] = []
@@ -304,6 +308,8 @@ class Compiler:
         self.header["work"] = self.take(self.method.integrator.work * len(self.particles))
         if self.method.integrator.reach > 0.0:
             Stiffness(self).build()
+        if self.method.integrator.linear:
+            add_propagators(self)
         generators: list[int] = []
         link = contact = 0
         for thing in self.scene.things:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..forces.springs import ONE_SIDED, REST_ALONE, TWO_SIDED
 from ..scene.forces import (
     AnchoredBungee,
     AnchoredSpring,
@@ -41,7 +42,7 @@ def add_forces(c: Compiler) -> None:
     summed = (
         scene.of(Spring, Bungee, AnchoredSpring, AnchoredBungee, Gravity, Buoyancy, UserForce)
         or (drags and integrator.sums_drag)
-        or (stiff_springs and integrator.smooth)
+        or (stiff_springs and integrator.smooth and not integrator.linear)
     )
     c.header["forced"] = int(bool(summed))
     force = c.take(3 * len(c.particles) + 3) if summed else -1
@@ -58,7 +59,12 @@ def add_forces(c: Compiler) -> None:
         else:
             a, b, end = spring.a, c.at("position", spring.b), c.at("force", spring.b)
             c.spring_ends.append((_movable(c, a), _movable(c, spring.b)))
-        single = int(isinstance(spring, Bungee | AnchoredBungee))
+        kind = TWO_SIDED
+        if isinstance(spring, Bungee | AnchoredBungee):
+            kind = ONE_SIDED
+        elif isinstance(spring, AnchoredSpring) and integrator.linear and a.movable:
+            kind = REST_ALONE
+            c.linear.setdefault(c.of(a), []).append((spring, None, True))
         springs += [
             c.at("position", a),
             b,
@@ -66,7 +72,7 @@ def add_forces(c: Compiler) -> None:
             end,
             stiffness,
             rest,
-            single,
+            kind,
         ]
     c.sections["springs"] = springs
     c.sections["gravities"] = []
@@ -107,14 +113,24 @@ def add_forces(c: Compiler) -> None:
                     lambda k1, inverse, i=index: derived.drag(k1, inverse[i : i + 1], share)[:, 0],
                 )
                 f = c.at("force", p) if force >= 0 else -1
+                brake = linear
+                if integrator.linear:
+                    # The flow holds what brakes; the wind's push k1 w is like a weight.
+                    c.linear.setdefault(index, []).append((drag, "linear", False))
+                    c.sections["gravities"] += [f, linear, wind]
+                    brake = c.zero
                 c.sections["drags"] += [
-                    c.at("velocity", p), f, linear, quadratic, wind, flow, flow + 1,
+                    c.at("velocity", p), f, brake, quadratic, wind, flow, flow + 1,
                 ]  # fmt: skip
     c.sections["stiff_springs"] = []
     for stiff in stiff_springs:
         if not stiff.particle.movable:
             for name in _PLAIN:
                 c.parameters.declare((stiff, name), getattr(stiff, name))
+        elif integrator.linear:
+            for name in _PLAIN:
+                c.parameters.declare((stiff, name), getattr(stiff, name))
+            c.linear.setdefault(c.of(stiff.particle), []).append((stiff, "damping", True))
         elif integrator.smooth:
             _plain_spring(c, stiff, spare)
         else:

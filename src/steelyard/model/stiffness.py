@@ -72,7 +72,9 @@ class Stiffness:
         c.header["mass"] = c.slot(
             len(c.particles),
             ((PARTICLES, "inverse_mass"),),
-            lambda inverse: np.where(inverse > 0.0, 1.0 / np.where(inverse > 0.0, inverse, 1.0), 0.0),
+            lambda inverse: np.where(
+                inverse > 0.0, 1.0 / np.where(inverse > 0.0, inverse, 1.0), 0.0
+            ),
         )
 
     def _diagonal(self, particle: int | None) -> int:
@@ -86,9 +88,7 @@ class Stiffness:
     def _unknowns(self) -> None:
         c = self.c
         c.sections["unknowns"] = [
-            word
-            for p in self.particles
-            for word in (3 * p, p, self._right(p), self._diagonal(p))
+            word for p in self.particles for word in (3 * p, p, self._right(p), self._diagonal(p))
         ]
 
     def _springs(self) -> None:
@@ -139,5 +139,10 @@ class Stiffness:
         for thing in c.scene.of(Buoyancy):
             p = c.of(thing.particle)
             movable = p if thing.particle.movable else None
-            floats += [self._diagonal(movable) + _YY, c.take(1), 3 * p + 1, self._right(movable) + 1]
+            floats += [
+                self._diagonal(movable) + _YY,
+                c.take(1),
+                3 * p + 1,
+                self._right(movable) + 1,
+            ]
         c.sections["float_blocks"] = floats

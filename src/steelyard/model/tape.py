@@ -86,8 +86,9 @@ from __future__ import annotations
     H_SPRING_BLOCKS,
     H_DRAG_BLOCKS,
     H_FLOAT_BLOCKS,
-) = range(77)
-HEADER = 77
+    H_PROPAGATORS,
+) = range(78)
+HEADER = 78
 
 # Width of the records of links and contacts; ``model.compile`` writes them field by field.
 LINK = 17
