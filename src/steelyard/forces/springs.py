@@ -1,8 +1,8 @@
 """Springs and bungees: F = -k (l - l0) n, n from the other end to this one.
 
-Record: x_a, x_b, force_a, force_b, stiffness, rest length, kind: both ways, one-sided (bungee), or only k l0 n, which
-is what a method leaves that moves -k x by a flow of its own. Where the ends coincide the
-direction, and so the force, is taken as zero. Energy k (l - l0)^2 / 2.
+Record: x_a, x_b, force_a, force_b, stiffness, rest length, kind: both ways, one-sided (bungee), or only k l0 n,
+which is what a method leaves that moves -k x by a flow of its own. Where the ends coincide the direction, and so the
+force, is taken as zero. Energy k (l - l0)^2 / 2.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
 """Backward Euler: v += h M^-1 f(x, v), x += h v, both at the step's end (``integrators.one_leg`` with s = 1).
 
 Order 1. L-stable: an undamped spring keeps (1 + h^2 w^2)^(-1/2) of its amplitude at each step, so all that the step
-does not resolve dies out; energy never rises on linear springs. Conserves linear momentum and, once Newton's method has
-converged, lets angular momentum only fall. One pass is linearly implicit (Baraff & Witkin 1998): of the same order, exact
-for linear forces. Stiff springs count as plain anchored ones; user-written forces are taken at the step's start. Refuses
-links, riders and contacts.
+does not resolve dies out; the energy of linear springs never rises. Conserves linear momentum, loses angular
+momentum. One pass is the linearly implicit form (Baraff & Witkin 1998), of the same order and the same for linear
+forces. Stiff springs count as plain anchored ones; user-written forces are taken at the step's start. Refuses links,
+riders and contacts.
 
 Source: Hairer & Wanner, *Solving Ordinary Differential Equations II*, IV.3.
 """

@@ -19,14 +19,14 @@ class Integrator:
     damping_share: ClassVar[float] = 1.0
     #: Whether drag is a force like all others, and not a flow of its own.
     sums_drag: ClassVar[bool] = False
-    #: Whether it takes the acceleration as one function of place and speed: damping as a rate, drag and stiff springs as
-    #: forces like all others.
+    #: Whether it takes the acceleration as one function of place and speed: damping as a rate, drag and stiff springs
+    #: as forces like all others.
     smooth: ClassVar[bool] = False
     #: Whether what is linear in one particle (anchored springs, damping, drag) is a flow of its own.
     linear: ClassVar[bool] = False
     #: Whether it needs closed forms of damping instead of powers.
     flies: ClassVar[bool] = False
-    #: When user-written forces are evaluated, as a share of the step, before each part of it; none where they cannot be.
+    #: When user-written forces are evaluated, as a share of the step, before each part of it; none if they cannot be.
     evaluations: ClassVar[tuple[float, ...]] = (0.0,)
     #: Share of the step by which implicit methods reach ahead: their matrix is M - r D - r^2 K with r = reach dt.
     reach: ClassVar[float] = 0.0

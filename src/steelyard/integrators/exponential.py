@@ -1,18 +1,18 @@
 """Exponential Runge-Kutta method ETDRK4: what is linear in one particle by its exact flow, all else by four stages.
 
-For a particle the linear part is y'' = -w^2 y - c y', with y = x - centre: w^2 the stiffness over the mass of its anchored springs
-and stiff springs, the centre the mean of their anchors, c the rate of its damping, linear drags and stiff springs.
-With u = (y, y'), L its matrix, N all other acceleration, e_t = exp(t L) and f_k = phi_k(h L):
+For a particle the linear part is y'' = -w^2 y - c y', with y = x - centre: w^2 the stiffness over the mass of its
+anchored springs and stiff springs, the centre the mean of their anchors, c the rate of its damping, linear drags and
+stiff springs. With u = (y, y'), L its matrix, N all other acceleration, e_t = exp(t L) and f_k = phi_k(h L):
 
     a = e_h/2 u + h/2 phi_1(h L/2) N(u)
     b = e_h/2 u + h/2 phi_1(h L/2) N(u) + h phi_2(h L/2) (N(a) - N(u))
     c = e_h u + h f_1 N(u) + 2 h f_2 (N(b) - N(u))
     u = e_h u + h (f_1 - 3 f_2 + 4 f_3) N(u) + h (2 f_2 - 4 f_3) (N(a) + N(b)) + h (4 f_3 - f_2) N(c)
 
-Order 4. Exact for every step, stiffness and damping: anchored springs without rest length, stiff springs, damping, linear drag in
-any wind, constant accelerations and forces, equilibria. Of an anchored spring with a rest length the part k l0 n is in
-N. So are springs between particles, bungees, floats and quadratic drag, which are stable as by RungeKutta4, h w < 2.8.
-Where L is zero the method is RungeKutta4. Refuses links, riders and contacts.
+Order 4. Exact for every step, stiffness and damping: anchored springs without rest length, stiff springs, damping,
+linear drag in any wind, constant accelerations and forces, equilibria. Of an anchored spring with a rest length the
+part k l0 n is in N. So are springs between particles, bungees, floats and quadratic drag, which are stable as by
+RungeKutta4, h w < 2.8. Refuses links, riders and contacts.
 
 Source: Krogstad (2005), *Generalized integrating factor methods for stiff PDEs*, after Cox & Matthews (2002).
 """

@@ -1,10 +1,10 @@
 """The matrix of implicit methods, S = M - r D - r^2 K: assembled at the state at hand, factorised, solved.
 
 D and K are the derivatives of the forces by velocity and position. A spring of stiffness k, length l and rest length
-l0 has K = -(k n n^T + t (1 - n n^T)), t = k (1 - l0/l). A compressed one buckles: t < 0, which is kept above
--m/(4 s r^2), s the number of springs at an end of mass m. So S > M/2 always, and K is exact where the step is short enough.
-A slack bungee counts nothing. D of drag is -(k1 + k2 |u|) - k2 u u^T/|u|, of damping -m c; a float in part
-under has -rho V g/(2 d) in its K.
+l0 has K = -(k n n^T + t (1 - n n^T)), t = k (1 - l0/l). A compressed one buckles: t < 0, which is kept above -m/(4 s
+r^2), s the number of springs at an end of mass m. So S > M/2 always, and K is exact where the step is short enough.
+A slack bungee counts nothing. D of drag is -(k1 + k2 |u|) - k2 u u^T/|u|, of damping -m c; a float in part under has
+-rho V g/(2 d) in its K.
 """
 
 from __future__ import annotations

@@ -11,8 +11,8 @@ order. L-stable: an undamped spring is stable at every step and loses what the s
 (g h w)^4/2 a step where that is small. Stiff networks lose rounding of about (h w)^2 2e-16 in what moves softly.
 Conserves linear momentum. Stiff springs count as plain anchored ones. Refuses links, riders and contacts.
 
-Source: Verwer, Spee, Blom & Hundsdorfer (1999), *A second-order Rosenbrock method applied to photochemical dispersion
-problems*.
+Source: Verwer, Spee, Blom & Hundsdorfer (1999), *A second-order Rosenbrock method applied to photochemical
+dispersion problems*.
 """
 
 from __future__ import annotations

@@ -2,9 +2,9 @@
 
     v_s = v + s h M^-1 f(x_s, v_s),   x_s = x + s h v_s,   then v += (v_s - v)/s,   x += h v_s.
 
-s = 1 is backward Euler, s = 1/2 the implicit midpoint rule. A pass corrects v_s by S^-1 of what is left of
-the first equation, S being the matrix of ``integrators.implicit`` with r = s h; it starts from the velocities of the
-step's start. A world whose correction is below the tolerance is frozen.
+s = 1 is backward Euler, s = 1/2 the implicit midpoint rule. A pass corrects v_s by S^-1 of what is left of the first
+equation, S being the matrix of ``integrators.implicit`` with r = s h; it starts from the velocities of the step's
+start. A world whose correction is below the tolerance is frozen.
 """
 
 from __future__ import annotations

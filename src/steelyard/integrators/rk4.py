@@ -6,8 +6,8 @@ With y = (x, v), f(y) = (v, a(x, v)) and the step h:
 
 Order 4. An undamped spring is stable while h w < 2 sqrt 2, and loses (h w)^6/72 of its energy at each step below
 that; pure damping is stable while its rate times h is below 2.785. Conserves linear momentum; energy and angular
-momentum to its order. Stiff springs count as plain anchored ones, under the same limits. Across the kink of a bungee or
-of a float the order drops. Refuses links, riders and contacts.
+momentum to its order. Stiff springs count as plain anchored ones, under the same limits. Across the kink of a bungee
+or of a float the order drops. Refuses links, riders and contacts.
 
 Source: Kutta (1901); Hairer, Norsett & Wanner, *Solving Ordinary Differential Equations I*, II.1.
 """

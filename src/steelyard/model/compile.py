@@ -25,9 +25,9 @@ from . import derived, tape
 from .constraints import add_contacts, add_links, add_riders
 from .forces import add_forces
 from .network import Network
+from .parameters import PARTICLES, Key, Parameters, Slot
 from .propagators import add_propagators
 from .stiffness import Stiffness
-from .parameters import PARTICLES, Key, Parameters, Slot
 from .tape import CONTACT, HEADER, LINK
 
 #: Header fields that are -1, not an empty section, where a scene has no such rows.

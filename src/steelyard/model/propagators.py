@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from . import derived
+from .exponentials import exponential_weights
 from .parameters import PARTICLES, Key
 
 if TYPE_CHECKING:
@@ -34,7 +35,7 @@ def add_propagators(c: Compiler) -> None:
             own = inverse[p : p + 1]
             square = _sum(given[:count]) * own
             rate = derived.rate(damping[p : p + 1]) + _sum(given[count:]) * own
-            return derived.exponential_weights(square, rate, c.method.dt)[:, 0]
+            return exponential_weights(square, rate, c.method.dt)[:, 0]
 
         centre = c.zero
         if springs:

@@ -109,11 +109,10 @@ class Stiffness:
                 return -1.0 / np.max(loads, axis=0) if loads else np.zeros(1)
 
             row = c.slot(1, ((PARTICLES, "inverse_mass"),), limit)
-            both = a is not None and b is not None
             records += [
                 self._diagonal(a),
                 self._diagonal(b),
-                self._coupling(a, b) if both else self.spare,
+                self._coupling(a, b),
                 c.take(_FRAME),
                 row,
                 -1 if a is None else 3 * a,
@@ -123,7 +122,9 @@ class Stiffness:
             ]
         c.sections["spring_blocks"] = records
 
-    def _coupling(self, a: int, b: int) -> int:
+    def _coupling(self, a: int | None, b: int | None) -> int:
+        if a is None or b is None:
+            return self.spare
         i, j = self.place[self.block[a]], self.place[self.block[b]]
         return self.a[max(i, j), min(i, j)]
 
