@@ -147,7 +147,7 @@ def test_order_on_smooth_motion(integrator: Any, name: str) -> None:
     exact = solve_ivp(rate, (0.0, 1.0), start, method="DOP853", rtol=2.5e-14, atol=1e-14).y[:, -1]
 
     # Steps short enough for the leading term of the error to stand alone.
-    counts = np.array([1, 2, 4, 8]) * {1: 500, 2: 100, 4: 200}[integrator.order()]
+    counts = np.array([1, 2, 4, 8]) * {1: 500, 2: 100, 4: 300}[integrator.order()]
     errors = []
     for count in counts.tolist():
         scene = sy.Scene()

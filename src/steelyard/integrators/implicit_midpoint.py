@@ -30,7 +30,7 @@ class ImplicitMidpoint(Integrator):
         tolerance: of the last pass's correction of positions, over the largest coordinate.
     """
 
-    passes: int = 12
+    passes: int = 30
     tolerance: float = 1e-12
 
     sums_drag: ClassVar[bool] = True

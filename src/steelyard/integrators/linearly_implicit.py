@@ -9,7 +9,8 @@ The positions are eliminated, which leaves S = M - g h D - (g h)^2 K on the velo
 Order 2 whatever A is (a W-method): clipped stiffness and user-written forces, which have no derivative here, cost no
 order. L-stable: an undamped spring is stable at every step and loses what the step cannot resolve, of its amplitude
 (g h w)^4/2 a step where that is small. Stiff networks lose rounding of about (h w)^2 2e-16 in what moves softly.
-Conserves linear momentum. Stiff springs count as plain anchored ones. Refuses links, riders and contacts.
+Conserves linear momentum. Far from rest, springs that turn or buckle within a step may feed energy in, as no bound
+holds for nonlinear forces. Stiff springs count as plain anchored ones. Refuses links, riders and contacts.
 
 Source: Verwer, Spee, Blom & Hundsdorfer (1999), *A second-order Rosenbrock method applied to photochemical
 dispersion problems*.

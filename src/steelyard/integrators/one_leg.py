@@ -85,12 +85,14 @@ def one_leg_correct(tape, s, skip, part):
                 row = tape[k] + component
                 more = select(active, load(s, tape[k + 2] + component), zero)
                 v = load(s, tape[H_VELOCITY] + row) + more
-                x = fma(reach, v, load(s, start + row))
+                u = load(s, start + row)
+                x = fma(reach, v, u)
                 store(s, tape[H_VELOCITY] + row, v)
                 store(s, tape[H_POSITION] + row, x)
                 more = absolute(reach * more)
                 change = select(more > change, more, change)
-                x = absolute(x)
+                # A stiff spring's leg may lie near 0, where only the start says how far rounding reaches.
+                x = absolute(x) + absolute(u)
                 far = select(x > far, x, far)
         left = change > load(s, tape[H_TOLERANCE]) * far
         store(s, tape[H_ACTIVE], select(left, splat(1.0), zero))

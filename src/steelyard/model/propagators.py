@@ -46,7 +46,8 @@ def add_propagators(c: Compiler) -> None:
 
 
 def _sum(values: tuple[np.ndarray, ...]) -> Any:
-    total: Any = np.zeros(1)
+    # A rounded stiffness over mass would turn the phase at every step.
+    total: Any = np.zeros(1, dtype=np.longdouble)
     for value in values:
         total = total + value
     return total
