@@ -9,6 +9,7 @@ from .integrators.implicit_midpoint import ImplicitMidpoint
 from .integrators.linearly_implicit import LinearlyImplicit
 from .integrators.rattle import Rattle
 from .integrators.rk4 import RungeKutta4
+from .integrators.step_impact import hermite, hermite_fall_time, step_impact
 from .integrators.symplectic_euler import SymplecticEuler
 from .kernel import inner, kernel
 from .math.random import normal, uniform, uniform_between
@@ -74,10 +75,13 @@ __all__ = [
     "flight",
     "flight_fall_time",
     "flight_impact",
+    "hermite",
+    "hermite_fall_time",
     "inner",
     "kernel",
     "normal",
     "scenes",
+    "step_impact",
     "uniform",
     "uniform_between",
 ]

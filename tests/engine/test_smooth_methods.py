@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 from typing import Any
 
+import mpmath
 import numpy as np
 import pytest
 from scipy.linalg import expm
@@ -440,6 +441,18 @@ def test_what_is_linear_in_one_particle_is_exact_for_the_exponential_method() ->
     y, v = turn @ start
     np.testing.assert_allclose(once.particles.position[0, 0], y + push / k, rtol=0, atol=1e-13)
     np.testing.assert_allclose(once.particles.velocity[0, 0], v, rtol=0, atol=1e-12)
+
+
+def test_an_anchored_spring_of_a_million_radians_per_second_at_60_hz() -> None:
+    h, w, steps = 1.0 / 60.0, 1e6, 600
+    world = springs(sy.ExponentialRungeKutta(), np.array([w * h]))
+    square = mpmath.mpf(float(world[world.scene.things[1]].stiffness.item())) / 2
+    world.step(steps)
+    with mpmath.workdps(40):
+        turn = mpmath.sqrt(square) * steps * mpmath.mpf(h)
+        v = mpmath.mpf(0.5 * (w * h) / h) / mpmath.sqrt(square)
+        x = mpmath.cos(turn) + v * mpmath.sin(turn)
+        assert abs(float(world.particles.position[0, 0, 0] - x)) < 1e-12
 
 
 def test_the_exponential_method_keeps_equilibria() -> None:
