@@ -135,9 +135,10 @@ class World:
         """One step in parts, with user-written forces and contacts evaluated in between."""
         generate_contacts(self)
         written = self.scene.of(UserForce)
-        shares = self.method.integrator.evaluations if written else (0.0,)
+        shares = self.method.integrator.evaluations if written else (None,)
         for part, share in enumerate(shares):
-            evaluate_forces(self, share * self.method.dt)
+            if share is not None:
+                evaluate_forces(self, share * self.method.dt)
             self._run(1, 1 << part if part < len(shares) - 1 else WHOLE_STEP << part)
 
     # Access

@@ -26,8 +26,9 @@ class Integrator:
     linear: ClassVar[bool] = False
     #: Whether it needs closed forms of damping instead of powers.
     flies: ClassVar[bool] = False
-    #: When user-written forces are evaluated, as a share of the step, before each part of it; none if they cannot be.
-    evaluations: ClassVar[tuple[float, ...]] = (0.0,)
+    #: When user-written forces are evaluated, as a share of the step, before each part of it (None: not before that
+    #: part); empty if they cannot be.
+    evaluations: ClassVar[tuple[float | None, ...]] = (0.0,)
     #: Share of the step by which implicit methods reach ahead: their matrix is M - r D - r^2 K with r = reach dt.
     reach: ClassVar[float] = 0.0
     #: Scratch rows per particle that it works in.

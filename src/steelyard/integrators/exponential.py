@@ -52,7 +52,7 @@ class ExponentialRungeKutta(Integrator):
     sums_drag: ClassVar[bool] = True
     smooth: ClassVar[bool] = True
     linear: ClassVar[bool] = True
-    evaluations: ClassVar[tuple[float, ...]] = (0.0, 0.5, 0.5, 1.0)
+    evaluations: ClassVar[tuple[float | None, ...]] = (0.0, 0.5, 0.5, 1.0)
     work: ClassVar[int] = 12
 
     def recipe(self, solver: Solver | None) -> Recipe:

@@ -12,7 +12,7 @@ from __future__ import annotations
 from ..forces import buoyancy, drag, springs
 from ..kernel import inner
 from ..math.lanes import any_lane, fma, load, select, splat, sqrt, store
-from ..math.vectors import dot, load_vector, store_vector
+from ..math.vectors import dot, load_vector
 from ..model.tape import (
     H_ACCELERATION,
     H_ACTIVE,
@@ -38,7 +38,7 @@ from ..model.tape import (
 from ..solvers import block_ldl
 from ..stage import stage
 
-UNKNOWN, SPRING_BLOCK, FLOAT_BLOCK = 4, 9, 4
+UNKNOWN, SPRING_BLOCK = 4, 4
 
 
 @inner
@@ -97,13 +97,9 @@ def _add_springs(tape, s, reach):
             stiffness = select(rest * inverse < one, stiffness, zero)
             stiffness = select(apart, stiffness, zero)
         across = stiffness * (one - rest * inverse)
-        lowest = load(s, tape[j + 4])
+        lowest = load(s, tape[j + 3])
         across = select(across > lowest, across, lowest)
         along = (stiffness - across) * inverse * inverse
-        frame = tape[j + 3]
-        store_vector(s, frame, x, y, z)
-        store(s, frame + 3, along)
-        store(s, frame + 4, across)
         along = square * along
         across = square * across
         _add_symmetric(s, tape[j], across, along, x, y, z)
@@ -152,14 +148,13 @@ def _add_floats(tape, s, reach):
     at = tape[H_BUOYANCIES]
     for index in range(tape[at]):
         k = at + 1 + buoyancy.RECORD * index
-        j = tape[H_FLOAT_BLOCKS] + 1 + FLOAT_BLOCK * index
+        target = tape[tape[H_FLOAT_BLOCKS] + 1 + index]
         half = load(s, tape[k + 3])
         depth = load(s, tape[k + 2]) + half - load(s, tape[k])
         slope = load(s, tape[k + 4]) / (half + half)
         slope = select(depth > zero, slope, zero)
         slope = select(depth < half + half, slope, zero)
-        store(s, tape[j + 1], slope)
-        store(s, tape[j], fma(reach * reach, slope, load(s, tape[j])))
+        store(s, target, fma(reach * reach, slope, load(s, target)))
 
 
 @stage
@@ -190,39 +185,6 @@ def load_force(tape, s, k):
         y = y + fy
         z = z + fz
     return x, y, z
-
-
-@inner
-def add_stiffness_product(tape, s, vector, weight):
-    """Right sides += weight K r, r the rows from ``vector`` on, three per particle."""
-    zero = splat(0.0)
-    at = tape[H_SPRING_BLOCKS]
-    for index in range(tape[at]):
-        k = at + 1 + SPRING_BLOCK * index
-        x, y, z = zero, zero, zero
-        if tape[k + 5] >= 0:
-            x, y, z = load_vector(s, vector + tape[k + 5])
-        if tape[k + 6] >= 0:
-            bx, by, bz = load_vector(s, vector + tape[k + 6])
-            x = x - bx
-            y = y - by
-            z = z - bz
-        frame = tape[k + 3]
-        dx, dy, dz = load_vector(s, frame)
-        along = weight * load(s, frame + 3) * dot(dx, dy, dz, x, y, z)
-        across = weight * load(s, frame + 4)
-        x = fma(along, dx, across * x)
-        y = fma(along, dy, across * y)
-        z = fma(along, dz, across * z)
-        ax, ay, az = load_vector(s, tape[k + 7])
-        store_vector(s, tape[k + 7], ax - x, ay - y, az - z)
-        bx, by, bz = load_vector(s, tape[k + 8])
-        store_vector(s, tape[k + 8], bx + x, by + y, bz + z)
-    at = tape[H_FLOAT_BLOCKS]
-    for index in range(tape[at]):
-        k = at + 1 + FLOAT_BLOCK * index
-        change = weight * load(s, tape[k + 1]) * load(s, vector + tape[k + 2])
-        store(s, tape[k + 3], load(s, tape[k + 3]) - change)
 
 
 @inner

@@ -35,7 +35,7 @@ class ImplicitMidpoint(Integrator):
 
     sums_drag: ClassVar[bool] = True
     smooth: ClassVar[bool] = True
-    evaluations: ClassVar[tuple[float, ...]] = ()
+    evaluations: ClassVar[tuple[float | None, ...]] = ()
     reach: ClassVar[float] = 0.5
     work: ClassVar[int] = 6
 

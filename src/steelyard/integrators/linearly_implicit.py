@@ -1,19 +1,21 @@
-"""Linearly implicit Runge-Kutta method of two stages, ROS2: no iteration, one sparse factor per step.
+"""Linearly implicit method of two stages: the L-stable diagonally implicit Runge-Kutta method of order 2, one pass of
+Newton's method a stage.
 
-For y = (x, v), y' = F(y), A its derivative, g = 1 - 1/sqrt(2):
+With g = 1 - 1/sqrt(2) and F(y) the rates of y = (x, v):
 
-    (1 - g h A) k1 = F(y),   (1 - g h A) k2 = F(y + h k1) - 2 k1,   y += h (3 k1 + k2)/2.
+    y1 = y + g h F(y1),   y2 = y + (1 - g) h F(y1) + g h F(y2),   y := y2.
 
-The positions are eliminated, which leaves S = M - g h D - (g h)^2 K on the velocities (``integrators.implicit``).
+Each stage is a leg of ``integrators.one_leg`` with S = M - g h D - (g h)^2 K, factorised where the stage is expected:
+x + g h v, and x + h v1. That the matrix belongs to the place of the forces is what holds stiff springs that turn by
+much in a step; with the matrix of the step's start alone (Rosenbrock methods) a cloth at 60 Hz blows up.
 
-Order 2 whatever A is (a W-method): clipped stiffness and user-written forces, which have no derivative here, cost no
-order. L-stable: an undamped spring is stable at every step and loses what the step cannot resolve, of its amplitude
-(g h w)^4/2 a step where that is small. Stiff networks lose rounding of about (h w)^2 2e-16 in what moves softly.
-Conserves linear momentum. Far from rest, springs that turn or buckle within a step may feed energy in, as no bound
-holds for nonlinear forces. Stiff springs count as plain anchored ones. Refuses links, riders and contacts.
+Order 2. L-stable: an undamped spring is stable at every step and loses what the step cannot resolve, of its amplitude
+(g h w)^4/2 a step where that is small. Conserves linear momentum; where stiff networks drift freely, to rounding of
+about (h w)^2 2e-16. Far from rest, springs that turn or buckle within a step may feed energy in, as no bound holds for
+nonlinear forces. Stiff springs count as plain anchored ones. User-written forces are taken where the stage is expected:
+order 2, or 1 in what depends on velocity. Refuses links, riders and contacts.
 
-Source: Verwer, Spee, Blom & Hundsdorfer (1999), *A second-order Rosenbrock method applied to photochemical
-dispersion problems*.
+Source: Alexander (1977), *Diagonally implicit Runge-Kutta methods for stiff ODEs*.
 """
 
 from __future__ import annotations
@@ -22,45 +24,39 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
-from ..forces.accumulate import sum_forces
 from ..math.lanes import fma, load, splat, store
-from ..math.vectors import load_vector, store_vector
-from ..model.tape import (
-    H_DT,
-    H_MASS,
-    H_PARTICLES,
-    H_POSITION,
-    H_REACH,
-    H_UNKNOWNS,
-    H_VELOCITY,
-    H_WORK,
-)
+from ..model.tape import H_ACTIVE, H_DT, H_PARTICLES, H_POSITION, H_REACH, H_VELOCITY, H_WORK
 from ..solvers.base import Solver
 from ..stage import stage
 from .base import Integrator, Recipe
-from .implicit import (
-    UNKNOWN,
-    add_stiffness_product,
-    factorise_motion,
-    load_force,
-    solve_motion,
-)
+from .one_leg import one_leg, one_leg_begin
+
+_GAMMA = 1.0 - 1.0 / math.sqrt(2.0)
 
 
 @dataclass(frozen=True)
 class LinearlyImplicit(Integrator):
-    """Second-order, L-stable, no iteration (see the module)."""
+    """Second order, L-stable (see the module).
+
+    Args:
+        passes: most passes of Newton's method in each stage; with more than one, a world that needs more is flagged in
+            ``world.health``.
+        tolerance: of the last pass's correction of positions, over the largest coordinate.
+    """
+
+    passes: int = 1
+    tolerance: float = 1e-12
 
     sums_drag: ClassVar[bool] = True
     smooth: ClassVar[bool] = True
-    evaluations: ClassVar[tuple[float, ...]] = (0.0, 1.0)
-    reach: ClassVar[float] = 1.0 - 1.0 / math.sqrt(2.0)
+    evaluations: ClassVar[tuple[float | None, ...]] = (None, _GAMMA, 1.0)
+    reach: ClassVar[float] = _GAMMA
     work: ClassVar[int] = 6
 
     def recipe(self, solver: Solver | None) -> Recipe:
-        """Two stages that share one factor."""
-        first = (sum_forces, 0), (factorise_motion, 0), (ros2_first, 0)
-        return (*first, (sum_forces, 1), (ros2_second, 1))
+        """Two legs; the second begins where the first has led."""
+        first, second = one_leg(self.passes, 1), one_leg(self.passes, 2)
+        return ((one_leg_begin, 0), *first, (second_leg_begin, 1), *second)
 
     def order(self) -> int:
         """Second order."""
@@ -72,65 +68,18 @@ class LinearlyImplicit(Integrator):
 
 
 @stage
-def ros2_first(tape, s, skip, part):
-    """S k1 = f + r K v for the velocities' rates; the state becomes y + h k1.
-
-    Work rows, three per particle: v1 - 2 k1 of the positions (0 where immovable), then k1 of the velocities.
-    """
-    dt = load(s, tape[H_DT])
+def second_leg_begin(tape, s, skip, part):
+    """Work rows := y + (1 - g) h F(y1), with F(y1) = (y1 - y)/(g h); the leg starts from the velocities of y1."""
+    store(s, tape[H_ACTIVE], splat(1.0))
     reach = load(s, tape[H_REACH])
-    zero = splat(0.0)
-    work = tape[H_WORK]
+    ahead = load(s, tape[H_DT]) - reach
+    grown = ahead / reach
+    start = tape[H_WORK]
     count = 3 * tape[H_PARTICLES]
     for row in range(count):
-        store(s, work + row, zero)
-    at = tape[H_UNKNOWNS]
-    for index in range(tape[at]):
-        k = at + 1 + UNKNOWN * index
-        x, y, z = load_force(tape, s, k)
-        store_vector(s, tape[k + 2], x, y, z)
-    add_stiffness_product(tape, s, tape[H_VELOCITY], reach)
-    solve_motion(tape, s, skip)
-    for index in range(tape[at]):
-        k = at + 1 + UNKNOWN * index
-        for component in range(3):
-            row = tape[k] + component
-            rate = load(s, tape[k + 2] + component)
-            v = load(s, tape[H_VELOCITY] + row)
-            moving = fma(reach, rate, v)
-            v = fma(dt, rate, v)
-            x = tape[H_POSITION] + row
-            store(s, x, fma(dt, moving, load(s, x)))
-            store(s, tape[H_VELOCITY] + row, v)
-            store(s, work + row, v - (moving + moving))
-            store(s, work + count + row, rate)
-
-
-@stage
-def ros2_second(tape, s, skip, part):
-    """S k2 = f - 2 M k1 + r K (v - 2 k1); then the other half of the step."""
-    half = splat(0.5) * load(s, tape[H_DT])
-    reach = load(s, tape[H_REACH])
-    work = tape[H_WORK]
-    count = 3 * tape[H_PARTICLES]
-    at = tape[H_UNKNOWNS]
-    for index in range(tape[at]):
-        k = at + 1 + UNKNOWN * index
-        twice = splat(-2.0) * load(s, tape[H_MASS] + tape[k + 1])
-        x, y, z = load_force(tape, s, k)
-        ax, ay, az = load_vector(s, work + count + tape[k])
-        store_vector(s, tape[k + 2], fma(twice, ax, x), fma(twice, ay, y), fma(twice, az, z))
-    add_stiffness_product(tape, s, work, reach)
-    solve_motion(tape, s, skip)
-    for index in range(tape[at]):
-        k = at + 1 + UNKNOWN * index
-        for component in range(3):
-            row = tape[k] + component
-            rate = load(s, tape[k + 2] + component)
-            v = load(s, tape[H_VELOCITY] + row)
-            rest = load(s, work + row)
-            # k1 + k2 of the positions, with k1 = (v - rest)/2 and k2 = rest + r rate.
-            moving = fma(splat(0.5), v + rest, reach * rate)
-            x = tape[H_POSITION] + row
-            store(s, x, fma(half, moving, load(s, x)))
-            store(s, tape[H_VELOCITY] + row, fma(half, load(s, work + count + row) + rate, v))
+        v = load(s, tape[H_VELOCITY] + row)
+        u = load(s, start + count + row)
+        x = fma(ahead, v, load(s, start + row))
+        store(s, start + row, x)
+        store(s, start + count + row, fma(grown, v - u, u))
+        store(s, tape[H_POSITION] + row, fma(reach, v, x))

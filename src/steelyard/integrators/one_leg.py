@@ -19,7 +19,6 @@ from ..model.tape import (
     H_DT,
     H_MASS,
     H_PARTICLES,
-    H_PASSES,
     H_POSITION,
     H_REACH,
     H_TOLERANCE,
@@ -35,10 +34,16 @@ if TYPE_CHECKING:
     from .base import Recipe
 
 
+def one_leg(passes: int, part: int) -> Recipe:
+    """So many passes at most; with more than one, worlds that need more are flagged."""
+    each = sum_forces, factorise_motion, one_leg_correct
+    stages = passes * each if passes == 1 else (*(passes * each), flag_unsettled)
+    return tuple((stage, part) for stage in stages)
+
+
 def one_leg_recipe(passes: int) -> Recipe:
-    """A step of so many passes at most."""
-    each = (sum_forces, 0), (factorise_motion, 0), (one_leg_correct, 0)
-    return ((one_leg_begin, 0), *(passes * each), (one_leg_end, 0))
+    """A step of one leg."""
+    return ((one_leg_begin, 0), *one_leg(passes, 0), (one_leg_end, 0))
 
 
 @stage
@@ -99,16 +104,20 @@ def one_leg_correct(tape, s, skip, part):
 
 
 @stage
+def flag_unsettled(tape, s, skip, part):
+    """Worlds whose last pass still corrected more than the tolerance."""
+    late = load(s, tape[H_ACTIVE]) > splat(0.5)
+    flag = tape[H_UNSETTLED]
+    store(s, flag, select(late, splat(1.0), load(s, flag)))
+
+
+@stage
 def one_leg_end(tape, s, skip, part):
-    """From the leg to the step's end; worlds that needed more passes are flagged."""
+    """From the leg to the step's end."""
     dt = load(s, tape[H_DT])
     outwards = dt / load(s, tape[H_REACH])
     start = tape[H_WORK]
     before = start + 3 * tape[H_PARTICLES]
-    if tape[H_PASSES] > 1:
-        late = load(s, tape[H_ACTIVE]) > splat(0.5)
-        flag = tape[H_UNSETTLED]
-        store(s, flag, select(late, splat(1.0), load(s, flag)))
     for row in range(3 * tape[H_PARTICLES]):
         v = load(s, tape[H_VELOCITY] + row)
         u = load(s, before + row)

@@ -89,7 +89,7 @@ class Compiler:
         self.widths = {
             "springs": 7, "gravities": 3, "buoyancies": 5, "drags": 7, "stiff_springs": 8, "drift": 1,
             "winches": 3, "movers": 5, "links": LINK, "contacts": CONTACT, "generators": 2,
-            "recipe": 2, "unknowns": 4, "spring_blocks": 9, "drag_blocks": 1, "float_blocks": 4,
+            "recipe": 2, "unknowns": 4, "spring_blocks": 4, "drag_blocks": 1, "float_blocks": 1,
             "propagators": 2,
         }  # fmt: skip
         self.next_row = 0
@@ -303,8 +303,7 @@ class Compiler:
         limit = getattr(settings, "passes", None)
         self.header["passes"] = getattr(settings, "iterations", 0) if limit is None else limit
         self.header["tolerance"] = self.constant(getattr(settings, "tolerance", 0.0))
-        iterates = hasattr(self.method.integrator, "passes")
-        self.header["active"] = self.take(1) if iterates else self.one
+        self.header["active"] = self.take(1) if self.method.integrator.reach > 0.0 else self.one
         self.header["work"] = self.take(self.method.integrator.work * len(self.particles))
         if self.method.integrator.reach > 0.0:
             Stiffness(self).build()

@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from .compile import Compiler
 
 _YY = 2
-#: Rows that a spring's derivative is kept in: direction, along and across.
-_FRAME = 5
 
 
 class Stiffness:
@@ -82,17 +80,16 @@ class Stiffness:
             return self.spare
         return self.diagonal[self.place[self.block[particle]]]
 
-    def _right(self, particle: int | None) -> int:
-        return self.spare if particle is None else self.c.header["right"] + 3 * self.block[particle]
-
     def _unknowns(self) -> None:
         c = self.c
         c.sections["unknowns"] = [
-            word for p in self.particles for word in (3 * p, p, self._right(p), self._diagonal(p))
+            word
+            for k, p in enumerate(self.particles)
+            for word in (3 * p, p, c.header["right"] + 3 * k, self._diagonal(p))
         ]
 
     def _springs(self) -> None:
-        """Per spring: its three blocks, its frame, the limit of a push, then its ends among vectors and right sides."""
+        """Per spring: the blocks of its ends and of their coupling, and the lowest stiffness across that counts."""
         c = self.c
         touching = np.zeros(len(c.particles))
         for ends in c.spring_ends:
@@ -113,12 +110,7 @@ class Stiffness:
                 self._diagonal(a),
                 self._diagonal(b),
                 self._coupling(a, b),
-                c.take(_FRAME),
                 row,
-                -1 if a is None else 3 * a,
-                -1 if b is None else 3 * b,
-                self._right(a),
-                self._right(b),
             ]
         c.sections["spring_blocks"] = records
 
@@ -129,7 +121,7 @@ class Stiffness:
         return self.a[max(i, j), min(i, j)]
 
     def _diagonals(self) -> None:
-        """Blocks of drags, and of floats with the row that keeps their slope."""
+        """Blocks of drags and entries of floats."""
         c = self.c
         velocity = c.header["velocity"]
         widths = c.widths
@@ -138,12 +130,6 @@ class Stiffness:
         c.sections["drag_blocks"] = [self._diagonal((drags[k] - velocity) // 3) for k in starts]
         floats: list[int] = []
         for thing in c.scene.of(Buoyancy):
-            p = c.of(thing.particle)
-            movable = p if thing.particle.movable else None
-            floats += [
-                self._diagonal(movable) + _YY,
-                c.take(1),
-                3 * p + 1,
-                self._right(movable) + 1,
-            ]
+            movable = c.of(thing.particle) if thing.particle.movable else None
+            floats.append(self._diagonal(movable) + _YY)
         c.sections["float_blocks"] = floats
