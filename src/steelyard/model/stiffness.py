@@ -1,7 +1,7 @@
 """The sparse matrix of implicit methods, M - r D - r^2 K, settled once when a scene is compiled.
 
 D and K are the derivatives of the forces by velocity and position. Blocks are the movable particles, coupled by the
-springs between them; their order (minimum degree), fill and index tapes are those of the direct solver.
+springs between them; their order (minimum fill), fill and index tapes are those of the direct solver.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class Stiffness:
             if a is not None and b is not None:
                 adjacency[self.block[a]].add(self.block[b])
                 adjacency[self.block[b]].add(self.block[a])
-        self.order = sparsity.minimum_degree(adjacency, 0, self.count)
+        self.order = sparsity.minimum_fill(adjacency)
         self.pattern = sparsity.fill(adjacency, self.order)
         self.place = {block: position for position, block in enumerate(self.order)}
 
