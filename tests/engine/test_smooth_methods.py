@@ -266,6 +266,7 @@ def mixture(integrator: Any, *, dt: float, worlds: int = 1) -> sy.World:
     scene.add(sy.Drag(linear=0.3, quadratic=0.4, wind=(1, 0, 2)))
     scene.add(sy.Buoyancy(b, surface=0.1, half_depth=1.0, volume=0.003))
     scene.add(sy.Buoyancy(d, surface=-3.0, half_depth=1.0, volume=0.003))
+    scene.add(sy.Buoyancy(c, surface=3.0, half_depth=0.2, volume=0.002))
     scene.add(sy.Gravity((0.2, 0, 0.1), particles=[b, c]))
     return sy.World(scene, worlds=worlds, method=sy.Method(integrator, dt=dt))
 
@@ -293,6 +294,7 @@ def forces(y: Array) -> Array:
     u = v - [1, 0, 2]
     f -= (0.3 + 0.4 * np.linalg.norm(u, axis=1, keepdims=True)) * u
     f[1, 1] += 1000.0 * 0.003 * 9.81 * np.clip((0.1 + 1.0 - x[1, 1]) / 2.0, 0.0, 1.0)
+    f[2, 1] += 1000.0 * 0.002 * 9.81
     f[1:3] += MASS[1:3, None] * [0.2, 0, 0.1]
     return f[1:].ravel()
 
