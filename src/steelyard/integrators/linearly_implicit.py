@@ -5,15 +5,18 @@ With g = 1 - 1/sqrt(2) and F(y) the rates of y = (x, v):
 
     y1 = y + g h F(y1),   y2 = y + (1 - g) h F(y1) + g h F(y2),   y := y2.
 
-Each stage is a leg of ``integrators.one_leg`` with S = M - g h D - (g h)^2 K, factorised where the stage is expected:
-x + g h v, and x + h v1. That the matrix belongs to the place of the forces is what holds stiff springs that turn by
-much in a step; with the matrix of the step's start alone (Rosenbrock methods) a cloth at 60 Hz blows up.
+Each stage is a leg of ``integrators.one_leg`` with S = M - g h D - (g h)^2 K, factorised where the stage is
+expected: x + g h v, and x + h v1. That the matrix belongs to the place of the forces is what holds stiff springs
+that turn by much in a step; with the matrix of the step's start alone (Rosenbrock methods) a cloth at 60 Hz blows
+up.
 
-Order 2. L-stable: an undamped spring is stable at every step and loses what the step cannot resolve, of its amplitude
-(g h w)^4/2 a step where that is small. Conserves linear momentum; where stiff networks drift freely, to rounding of
-about (h w)^2 2e-16. Far from rest, springs that turn or buckle within a step may feed energy in, as no bound holds for
-nonlinear forces. Stiff springs count as plain anchored ones. User-written forces are taken where the stage is expected:
-order 2, or 1 in what depends on velocity. Refuses links, riders and contacts.
+Order 2. L-stable: an undamped spring is stable at every step and loses what the step cannot resolve, of its
+amplitude (g h w)^4/2 a step where that is small. Conserves linear momentum; where stiff networks drift freely, to
+rounding of about (h w)^2 2e-16. No bound holds for forces that are not linear: springs that turn by much within a
+step may feed energy in. A cloth of 20 x 20 let fall for 1 s at 60 Hz holds with one pass to h w = 105 of its fastest
+mode, with two to 330, with four to 1,050 (BackwardEuler: all). Stiff springs count as plain anchored ones. User-
+written forces are taken where the stage is expected: order 2, or 1 in what depends on velocity. Refuses links,
+riders and contacts.
 
 Source: Alexander (1977), *Diagonally implicit Runge-Kutta methods for stiff ODEs*.
 """
