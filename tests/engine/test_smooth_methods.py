@@ -388,6 +388,25 @@ def test_an_immovable_particle_never_moves(integrator: Any) -> None:
     assert np.isfinite(world.particles.position).all()
 
 
+@_over([sy.RungeKutta4(), sy.ExponentialRungeKutta()])
+def test_a_written_force_is_evaluated_at_every_stage(integrator: Any) -> None:
+    def brake(x: Array, v: Array, t: Array) -> Array:
+        return -0.4 * np.linalg.norm(v, axis=2, keepdims=True) * v
+
+    def final(force: Any) -> Array:
+        scene = sy.Scene()
+        p = scene.add(sy.Particle(position=(1, 0, 0), velocity=(0, 3, 1), mass=2.5))
+        scene.add(sy.AnchoredSpring(p, (0, 0, 0), 50.0, 0.5))
+        scene.add(force)
+        world = sy.World(scene, method=sy.Method(integrator, dt=0.05))
+        world.step(100)
+        assert world.time[0] == pytest.approx(5.0, rel=1e-13)
+        return world.particles.position[0, 0].copy()
+
+    written, built_in = final(sy.UserForce(brake)), final(sy.Drag(quadratic=0.4))
+    np.testing.assert_allclose(written, built_in, rtol=0, atol=1e-13)
+
+
 # Where the stiffness would not be definite
 
 
