@@ -6,7 +6,7 @@ springs, to the tolerance. Energy of other forces it keeps near, without drift, 
 does not resolve rings on undamped, and strong damping makes such a mode change sign at each step: use
 LinearlyImplicit there. Nor does Newton's method converge where springs turn by much in a step (a cloth of 20 x 20 at
 60 Hz); such worlds are flagged. Stiff springs count as plain anchored ones. Refuses links, riders and contacts, and
-user- written forces, which its iteration cannot call.
+user-written forces, which its iteration cannot call.
 
 Source: Hairer, Lubich & Wanner, *Geometric Numerical Integration*, II.1, IV.2.
 """
