@@ -1,9 +1,15 @@
 """Steelyard: a batched physics engine that lets you weigh speed against accuracy."""
 
 from . import draw, scenes
+from .integrators.backward_euler import BackwardEuler
 from .integrators.closed_form import ClosedForm, flight, flight_fall_time, flight_impact
 from .integrators.explicit_euler import ExplicitEuler
+from .integrators.exponential import ExponentialRungeKutta
+from .integrators.implicit_midpoint import ImplicitMidpoint
+from .integrators.linearly_implicit import LinearlyImplicit
 from .integrators.rattle import Rattle
+from .integrators.rk4 import RungeKutta4
+from .integrators.step_impact import hermite, hermite_fall_time, step_impact
 from .integrators.symplectic_euler import SymplecticEuler
 from .kernel import inner, kernel
 from .math.random import normal, uniform, uniform_between
@@ -33,6 +39,7 @@ from .world import World
 __all__ = [
     "AnchoredBungee",
     "AnchoredSpring",
+    "BackwardEuler",
     "Bungee",
     "Buoyancy",
     "Cable",
@@ -42,16 +49,20 @@ __all__ = [
     "Direct",
     "Drag",
     "ExplicitEuler",
+    "ExponentialRungeKutta",
     "GaussSeidel",
     "Gravity",
     "Ground",
+    "ImplicitMidpoint",
     "LinePlatform",
+    "LinearlyImplicit",
     "Method",
     "Particle",
     "Rattle",
     "Rider",
     "Rod",
     "RodConstraint",
+    "RungeKutta4",
     "Scene",
     "Spring",
     "StiffSpring",
@@ -64,10 +75,13 @@ __all__ = [
     "flight",
     "flight_fall_time",
     "flight_impact",
+    "hermite",
+    "hermite_fall_time",
     "inner",
     "kernel",
     "normal",
     "scenes",
+    "step_impact",
     "uniform",
     "uniform_between",
 ]

@@ -8,9 +8,10 @@ from .integrators.base import Integrator
 from .integrators.closed_form import ClosedForm
 from .integrators.explicit_euler import ExplicitEuler
 from .integrators.rattle import Rattle
+from .integrators.rk4 import RungeKutta4
 from .integrators.symplectic_euler import SymplecticEuler
 from .scene import checks
-from .scene.forces import StiffSpring
+from .scene.forces import StiffSpring, UserForce
 from .scene.links import Cable, CableConstraint
 from .scene.rider import Rider
 from .scene.scene import CONTACTS, FORCES, LINKS, Scene
@@ -47,11 +48,12 @@ class Method:
         checks.instance("Method", "integrator", self.integrator, Integrator, remedy="Use Rattle().")
         if self.solver is not None:
             checks.instance("Method", "solver", self.solver, Solver, remedy="Use Direct().")
-        owner = type(self.solver).__name__
-        for name, least in (("passes", 1), ("iterations", 0)):
-            count = getattr(self.solver, name, least)
-            checks.whole(owner, name, count, least=least, remedy="Give a count.")
-        checks.number(owner, "tolerance", getattr(self.solver, "tolerance", 1.0), _TOLERANCE)
+        for part in (self.integrator, self.solver):
+            owner = type(part).__name__
+            for name, least in (("passes", 1), ("iterations", 0)):
+                count = getattr(part, name, least)
+                checks.whole(owner, name, count, least=least, remedy="Give a count.")
+            checks.number(owner, "tolerance", getattr(part, "tolerance", 1.0), _TOLERANCE)
 
     def refuse(self, scene: Scene) -> None:
         """Raise if this method cannot do what a scene holds.
@@ -68,6 +70,16 @@ class Method:
                     f"ClosedForm cannot step a {type(other[0]).__name__}; the limit is free flight "
                     "with constant acceleration and damping. Use Rattle()."
                 )
+        elif held and not self.integrator.solver_stages:
+            raise ValueError(
+                f"{name} cannot hold a {type(held[0]).__name__}; it steps particles under forces alone. "
+                "Use Rattle() with Direct()."
+            )
+        elif scene.of(UserForce) and not self.integrator.evaluations:
+            raise ValueError(
+                f"{name} cannot take a UserForce: it needs the force at states that only its own iteration "
+                "knows. Use LinearlyImplicit() or RungeKutta4()."
+            )
         elif held and self.solver is None:
             raise ValueError(
                 f"{name} alone cannot hold a {type(held[0]).__name__}; it needs a solver. "
@@ -119,6 +131,7 @@ __all__ = [
     "GaussSeidel",
     "Method",
     "Rattle",
+    "RungeKutta4",
     "SymplecticEuler",
     "WorstFirst",
 ]

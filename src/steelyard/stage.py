@@ -49,10 +49,10 @@ class Stage:
 
 
 def stage(function: Callable[..., None]) -> Stage:
-    """A piece of a step: ``function(tape, s, skip, half)``.
+    """A piece of a step: ``function(tape, s, skip, part)``.
 
     It gets the index tape, the scratch of one block of worlds, the flags of blocks left out of the matrix (and
-    a few words behind them), and 0 in the first half of a step or 1 in the second.
+    a few words behind them), and which part of the step it is: of most methods 0 in the first half, 1 in the second.
     """
     return Stage(function, (Tape, Doubles, Integers, types.int64))
 

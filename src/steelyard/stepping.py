@@ -34,8 +34,8 @@ from .stage import Stage, call_stage, caller
 if TYPE_CHECKING:
     from .model.compile import Model
 
-FIRST_HALF, SECOND_HALF = 1, 2
-BOTH_HALVES = FIRST_HALF | SECOND_HALF
+# Parts of a step to run, a bit for each; the last part takes all higher bits, so its mask is negative.
+WHOLE_STEP = -1
 _HASTY_STEPS = 2
 
 # Entries of a launch: addresses of the stepping kernel and of the arrays it works on, and their sizes.
@@ -100,13 +100,13 @@ def _flag_nonfinite(tape, s):
 
 @inner
 def _step(tape, s, skip, phase):
-    """One substep of a block: the recipe's stages that belong to the wanted halves."""
+    """One substep of a block: the recipe's stages that belong to the wanted parts; the last moves the clock."""
     at = tape[H_RECIPE]
     for index in range(tape[at]):
-        half = tape[at + 2 + 2 * index]
-        if phase & (SECOND_HALF if half == 1 else FIRST_HALF):
-            call_stage(tape[at + 1 + 2 * index], tape, s, skip, half)
-    if phase & SECOND_HALF:
+        part = tape[at + 2 + 2 * index]
+        if (phase >> part) & 1 != 0:
+            call_stage(tape[at + 1 + 2 * index], tape, s, skip, part)
+    if phase < 0:
         clock = tape[H_TIME]
         store(s, clock, load(s, clock) + load(s, tape[H_DT]))
 
@@ -130,7 +130,7 @@ def _advance_blocks(launch, first, last, substeps, phase):
     worlds = launch[L_WORLDS]
     words = tape[H_BLOCKS]
     worth = worlds > LANES and substeps <= _HASTY_STEPS
-    worth = worth and tape[H_HASTY] != 0 and phase == BOTH_HALVES
+    worth = worth and tape[H_HASTY] != 0 and phase == WHOLE_STEP
     waiting = 0
     block = first
     while block < last or waiting > 0:
@@ -204,7 +204,7 @@ def launch(
 
 @kernel
 def advance_blocks(launch, first, last, substeps, phase):
-    """Advance the worlds of blocks ``first`` ... ``last - 1``; ``phase`` is FIRST_HALF | SECOND_HALF."""
+    """Advance the worlds of blocks ``first`` ... ``last - 1``; ``phase`` is WHOLE_STEP or bits of its parts."""
     _call_advance(launch[L_ADVANCE], integers_at(launch.ctypes.data), first, last, substeps, phase)
 
 
@@ -218,4 +218,4 @@ def advance(launch, substeps):
     """
     blocks = (launch[L_WORLDS] + LANES - 1) // LANES
     pointer = integers_at(launch.ctypes.data)
-    _call_advance(launch[L_ADVANCE], pointer, 0, blocks, substeps, BOTH_HALVES)
+    _call_advance(launch[L_ADVANCE], pointer, 0, blocks, substeps, WHOLE_STEP)

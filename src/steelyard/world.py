@@ -31,7 +31,7 @@ from .state import (
     new_scratch,
     new_state,
 )
-from .stepping import FIRST_HALF, SECOND_HALF, advance_blocks, launch
+from .stepping import WHOLE_STEP, advance_blocks, launch
 from .written import evaluate_forces, generate_contacts
 
 
@@ -111,12 +111,12 @@ class World:
             for _ in range(steps):
                 self._step_split()
         else:
-            self._run(steps, FIRST_HALF | SECOND_HALF)
+            self._run(steps, WHOLE_STEP)
 
     def _run(self, steps: int, phase: int) -> None:
         blocks = -(-self._worlds // LANES)
         if self._split:
-            # Between the halves of a step a block's scratch keeps what the step's start decided.
+            # Between the parts of a step a block's scratch keeps what the step's start decided.
             edges = np.arange(blocks + 1)
         else:
             edges = np.linspace(0, blocks, min(self._threads, blocks) + 1).astype(int)
@@ -134,13 +134,12 @@ class World:
     def _step_split(self) -> None:
         """One step in parts, with user-written forces and contacts evaluated in between."""
         generate_contacts(self)
-        evaluate_forces(self)
-        if self.method.integrator.damping_share == 1.0 or not self.scene.of(UserForce):
-            self._run(1, FIRST_HALF | SECOND_HALF)
-        else:
-            self._run(1, FIRST_HALF)
-            evaluate_forces(self, self.method.dt)
-            self._run(1, SECOND_HALF)
+        written = self.scene.of(UserForce)
+        shares = self.method.integrator.evaluations if written else (None,)
+        for part, share in enumerate(shares):
+            if share is not None:
+                evaluate_forces(self, share * self.method.dt)
+            self._run(1, 1 << part if part < len(shares) - 1 else WHOLE_STEP << part)
 
     # Access
 

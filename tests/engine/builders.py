@@ -25,6 +25,14 @@ RESOLVED = {
     "ExplicitEuler-WorstFirst": (sy.ExplicitEuler(), sy.WorstFirst()),
 }
 METHODS = STAGED | RESOLVED
+# What steps particles under forces alone.
+SMOOTH = {
+    "RungeKutta4": (sy.RungeKutta4(), None),
+    "ExponentialRungeKutta": (sy.ExponentialRungeKutta(), None),
+    "LinearlyImplicit": (sy.LinearlyImplicit(), None),
+    "BackwardEuler": (sy.BackwardEuler(passes=4, tolerance=1e-3), None),
+    "ImplicitMidpoint": (sy.ImplicitMidpoint(tolerance=1e-6), None),
+}
 
 # An exact solver's residual is its tolerance; the sweeps' what 60 passes leave on the tests' scenes;
 # the source's resolver leaves what the last contacts resolved did to the others.
@@ -33,7 +41,7 @@ _RESIDUAL = {"Direct": 1e-12, "GaussSeidel": 1e-4, "WorstFirst": 0.1}
 
 def method(name: str, *, dt: float) -> sy.Method:
     """A method of the tables above."""
-    integrator, solver = METHODS[name]
+    integrator, solver = (METHODS | SMOOTH)[name]
     return sy.Method(integrator, solver, dt=dt)
 
 

@@ -15,7 +15,7 @@ import pytest
 
 import steelyard as sy
 from benchmarks.scenes import bridge, tumbling_platform
-from tests.engine.builders import METHODS, Array, from_particle_scene, method
+from tests.engine.builders import METHODS, SMOOTH, Array, from_particle_scene, method
 
 DT = 1 / 60
 STEPS = 60
@@ -116,6 +116,32 @@ def springs() -> sy.Scene:
     return scene
 
 
+def mesh() -> sy.Scene:
+    """Springs stiff and soft between particles, one of them fixed, in wind over water."""
+    scene = sy.Scene()
+    some = [
+        scene.add(sy.Particle(position=(0.5 * (k % 3), 0.4 * (k // 3), 0.1 * k), damping=0.9))
+        for k in range(8)
+    ]
+    some.append(scene.add(sy.Particle(position=(1.0, 0.8, 0.8), inverse_mass=0.0)))
+    for k, a in enumerate(some):
+        for b in some[k + 1 : k + 4]:
+            scene.add(sy.Spring(a, b, 300.0 * (1.0 + k % 4), 0.4))
+    scene.add(sy.Bungee(some[0], some[5], 150.0, 0.7))
+    scene.add(sy.AnchoredSpring(some[0], (0.0, 1.0, 0.0), 80.0, 0.5))
+    scene.add(sy.StiffSpring(some[2], (1.0, 0.0, 0.2), 1e3, 3.0))
+    scene.add(sy.Drag(linear=0.1, quadratic=0.05, wind=(1.0, 0.0, 0.5)))
+    scene.add(sy.Buoyancy(some[1], surface=0.2, half_depth=0.3, volume=0.002))
+    return scene
+
+
+def blown_mesh() -> sy.Scene:
+    """The same in a force written by the user."""
+    scene = mesh()
+    scene.add(sy.UserForce(wind))
+    return scene
+
+
 SCENES: dict[str, Callable[[], sy.Scene]] = {
     "landing bridge": landing_bridge,
     "falling platform": falling_platform,
@@ -124,12 +150,22 @@ SCENES: dict[str, Callable[[], sy.Scene]] = {
     "cage": cage,
     "balls": balls,
     "springs": springs,
+    "mesh": mesh,
+    "blown mesh": blown_mesh,
 }
+FORCES_ALONE = ("mesh", "blown mesh")
 PAIRS = [
     (scene, name)
     for scene in SCENES
     for name in METHODS
+    if scene not in FORCES_ALONE
     if not (scene == "ridden platform" and name.endswith("WorstFirst"))
+]
+PAIRS += [
+    (scene, name)
+    for scene in FORCES_ALONE
+    for name in SMOOTH
+    if not (scene == "blown mesh" and name == "ImplicitMidpoint")
 ]
 
 
@@ -137,11 +173,13 @@ def vary(world: sy.World, kinds: Sequence[int]) -> None:
     """Give world k of the batch the state and parameters of ``kinds[k]``."""
     count = len(world.scene.particles)
     draws = [np.random.default_rng([7, kind]) for kind in kinds]
-    world.particles.mass = np.array([rng.uniform(0.5, 3.0, count) for rng in draws])
+    movable = np.isfinite(world.particles.mass)
+    masses = np.array([rng.uniform(0.5, 3.0, count) for rng in draws])
+    world.particles.mass = np.where(movable, masses, np.inf)
     world.particles.damping = np.array([rng.uniform(0.7, 1.0, count) for rng in draws])
     speed = np.array([rng.choice([0.3, 1.0, 2.0]) for rng in draws])
     kick = np.array([rng.standard_normal((count, 3)) for rng in draws])
-    world.particles.velocity[:] += speed[:, None, None] * kick
+    world.particles.velocity[:] += speed[:, None, None] * kick * movable[:, None]
     world.gravity = np.array([[0.0, rng.uniform(-12.0, -8.0), 0.0] for rng in draws])
     for ground in world.scene.of(sy.Ground):
         world[ground].friction = np.array([[rng.uniform(0.1, 0.8)] for rng in draws])

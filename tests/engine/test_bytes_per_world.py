@@ -75,8 +75,17 @@ def test_links_and_contacts_cost_what_the_solver_remembers_of_them(kind: str) ->
 
 @pytest.mark.parametrize(
     "method",
-    [sy.Method(sy.Rattle()), sy.Method(sy.ClosedForm()), WORST_FIRST],
-    ids=["no solver", "closed form", "worst first"],
+    [
+        sy.Method(sy.Rattle()),
+        sy.Method(sy.ClosedForm()),
+        sy.Method(sy.RungeKutta4()),
+        sy.Method(sy.ExponentialRungeKutta()),
+        sy.Method(sy.LinearlyImplicit()),
+        sy.Method(sy.BackwardEuler()),
+        sy.Method(sy.ImplicitMidpoint()),
+        WORST_FIRST,
+    ],
+    ids=lambda method: type(method.solver or method.integrator).__name__,
 )
 def test_a_solver_without_links_and_contacts_costs_nothing(method: sy.Method) -> None:
     assert cost(method=method) == cost()

@@ -27,7 +27,12 @@ STIFFNESS = [10.0**n for n in range(11)]
 RATIO = [0.0, 0.1, 1.0, 10.0, 1e3]
 MASS = [0.3, 1.0, 7.0]
 
-INTEGRATORS = [sy.ExplicitEuler(), sy.SymplecticEuler(), sy.Rattle()]
+INTEGRATORS = [
+    sy.ExplicitEuler(),
+    sy.SymplecticEuler(),
+    sy.Rattle(),
+    sy.ExponentialRungeKutta(),
+]
 every_integrator = pytest.mark.parametrize(
     "integrator", INTEGRATORS, ids=lambda integrator: type(integrator).__name__
 )

@@ -61,6 +61,13 @@ def test_a_tolerance_that_cannot_be_met(bad: Any) -> None:
 
 HELD = [thing for thing in things(A, B) if isinstance(thing, (*LINKS, *CONTACTS, sy.Rider))]
 STAGED = [sy.Direct(), sy.GaussSeidel()]
+SMOOTH = [
+    sy.RungeKutta4(),
+    sy.ExponentialRungeKutta(),
+    sy.LinearlyImplicit(),
+    sy.BackwardEuler(),
+    sy.ImplicitMidpoint(),
+]
 # What cannot be combined, whatever the scene holds.
 UNFIT = [
     (sy.ExplicitEuler(), None),
@@ -73,6 +80,7 @@ UNFIT = [
     (sy.ClosedForm(), sy.Direct()),
     (sy.ClosedForm(), sy.GaussSeidel()),
     (sy.ClosedForm(), sy.WorstFirst()),
+    *((i, s) for i in SMOOTH for s in (None, sy.Direct(), sy.GaussSeidel(), sy.WorstFirst())),
 ]
 FIT = [
     (sy.ExplicitEuler(), sy.WorstFirst()),
@@ -90,6 +98,7 @@ def _names(method: Any) -> str:
 
 def test_every_combination_is_either_fit_or_unfit() -> None:
     integrators = [sy.ExplicitEuler, sy.SymplecticEuler, sy.Rattle, sy.ClosedForm]
+    integrators += map(type, SMOOTH)
     solvers = [type(None), sy.WorstFirst, sy.Direct, sy.GaussSeidel]
     tried = [(type(i), type(s)) for i, s in UNFIT + FIT]
     assert sorted(map(str, tried)) == sorted(str((i, s)) for i in integrators for s in solvers)
@@ -103,7 +112,7 @@ def test_a_method_that_cannot_hold_what_the_scene_holds(method: Any, k: int) -> 
     scene.add(thing)
     integrator, solver = method
     words = [type(integrator).__name__, "Use "]
-    if solver is None or isinstance(integrator, sy.ClosedForm):
+    if solver is None or not integrator.solver_stages:
         words.append(type(thing).__name__)
     else:
         words.append(type(solver).__name__)

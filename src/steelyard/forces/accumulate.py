@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from ..kernel import inner
-from ..math.lanes import load, splat, store
-from ..model.tape import H_FORCE, H_FORCED, H_PARTICLES, H_USER_FORCES
+from ..math.lanes import any_lane, load, splat, store
+from ..model.tape import H_ACTIVE, H_FORCE, H_FORCED, H_PARTICLES, H_USER_FORCES
+from ..stage import stage
 from .buoyancy import add_buoyancy
+from .drag import add_drag
 from .gravity import add_gravity
 from .springs import add_springs
 
@@ -26,3 +28,11 @@ def accumulate_forces(tape, s):
         for row in range(3 * tape[H_PARTICLES]):
             f = tape[H_FORCE] + row
             store(s, f, load(s, f) + load(s, given + row))
+
+
+@stage
+def sum_forces(tape, s, skip, part):
+    """All forces at the state at hand, drag too; nothing where no world is active."""
+    if any_lane(load(s, tape[H_ACTIVE]) > splat(0.5)):
+        accumulate_forces(tape, s)
+        add_drag(tape, s)

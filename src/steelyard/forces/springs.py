@@ -1,7 +1,8 @@
 """Springs and bungees: F = -k (l - l0) n, n from the other end to this one.
 
-Record: x_a, x_b, force_a, force_b, stiffness, rest length, one-sided (bungee). Where the ends coincide the
-direction, and so the force, is taken as zero. Energy k (l - l0)^2 / 2.
+Record: x_a, x_b, force_a, force_b, stiffness, rest length, kind: both ways, one-sided (bungee), or only k l0 n,
+which is what a method leaves that moves -k x by a flow of its own. Where the ends coincide the direction, and so the
+force, is taken as zero. Energy k (l - l0)^2 / 2.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from ..math.lanes import fma, load, select, splat, sqrt, store
 from ..model.tape import H_SPRINGS
 
 RECORD = 7
+TWO_SIDED, ONE_SIDED, REST_ALONE = range(3)
 
 
 @inner
@@ -27,8 +29,10 @@ def add_springs(tape, s):
         z = load(s, a + 2) - load(s, b + 2)
         length = sqrt(fma(z, z, fma(y, y, x * x)))
         stretch = length - load(s, tape[k + 5])
-        if tape[k + 6] != 0:
+        if tape[k + 6] == ONE_SIDED:
             stretch = select(stretch > zero, stretch, zero)
+        elif tape[k + 6] == REST_ALONE:
+            stretch = zero - load(s, tape[k + 5])
         apart = length > zero
         pull = load(s, tape[k + 4]) * stretch / select(apart, length, splat(1.0))
         pull = select(apart, zero - pull, zero)

@@ -19,13 +19,25 @@ class Integrator:
     damping_share: ClassVar[float] = 1.0
     #: Whether drag is a force like all others, and not a flow of its own.
     sums_drag: ClassVar[bool] = False
+    #: Whether it takes the acceleration as one function of place and speed: damping as a rate, drag and stiff springs
+    #: as forces like all others.
+    smooth: ClassVar[bool] = False
+    #: Whether what is linear in one particle (anchored springs, damping, drag) is a flow of its own.
+    linear: ClassVar[bool] = False
     #: Whether it needs closed forms of damping instead of powers.
     flies: ClassVar[bool] = False
+    #: When user-written forces are evaluated, as a share of the step, before each part of it (None: not before that
+    #: part); empty if they cannot be.
+    evaluations: ClassVar[tuple[float | None, ...]] = (0.0,)
+    #: Share of the step by which implicit methods reach ahead: their matrix is M - r D - r^2 K with r = reach dt.
+    reach: ClassVar[float] = 0.0
+    #: Scratch rows per particle that it works in.
+    work: ClassVar[int] = 0
     #: Whether it works with a solver of displacements and velocities (True), of impulses (False).
     solver_stages: ClassVar[tuple[bool, ...]] = ()
 
     def recipe(self, solver: Solver | None) -> Recipe:
-        """Stages of a step in order, each with its half: 0, or 1 for what follows the new positions.
+        """Stages of a step in order, each with its part: of most methods 0, or 1 for what follows the new positions.
 
         Args:
             solver: what holds the constraints; None where there are none.

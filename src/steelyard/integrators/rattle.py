@@ -31,6 +31,7 @@ class Rattle(Integrator):
     """Velocity Verlet, with constraints RATTLE (see the module)."""
 
     damping_share: ClassVar[float] = 0.5
+    evaluations: ClassVar[tuple[float | None, ...]] = (0.0, 1.0)
     solver_stages: ClassVar[tuple[bool, ...]] = (True,)
 
     def recipe(self, solver: Solver | None) -> Recipe:

@@ -26,6 +26,8 @@ from .constraints import add_contacts, add_links, add_riders
 from .forces import add_forces
 from .network import Network
 from .parameters import PARTICLES, Key, Parameters, Slot
+from .propagators import add_propagators
+from .stiffness import Stiffness
 from .tape import CONTACT, HEADER, LINK
 
 #: Header fields that are -1, not an empty section, where a scene has no such rows.
@@ -45,7 +47,7 @@ class Model:
         start: (state rows,) state at time 0.
         parameters: assignable values and the rows that follow from them.
         places: first state row and size of what varies, by (thing, name).
-        recipe: stages of a step in order, each with its half.
+        recipe: stages of a step in order, each with its part.
         blocks: number of matrix blocks.
         skip: entries of the flags of blocks and what stands behind them.
     """
@@ -80,10 +82,15 @@ class Compiler:
         self.header: dict[str, int] = {}
         self.sections: dict[str, list[int]] = {}
         self.counts: dict[str, int] = {}
+        #: Movable ends of every record of the springs' section.
+        self.spring_ends: list[tuple[int | None, int | None]] = []
+        #: Forces that are linear in one particle: the thing, its parameter that brakes, whether it is a spring.
+        self.linear: dict[int, list[tuple[Any, str | None, bool]]] = {}
         self.widths = {
             "springs": 7, "gravities": 3, "buoyancies": 5, "drags": 7, "stiff_springs": 8, "drift": 1,
             "winches": 3, "movers": 5, "links": LINK, "contacts": CONTACT, "generators": 2,
-            "recipe": 2,
+            "recipe": 2, "unknowns": 4, "spring_blocks": 4, "drag_blocks": 1, "float_blocks": 1,
+            "propagators": 2,
         }  # fmt: skip
         self.next_row = 0
         self.start: list[float] = []
@@ -264,12 +271,15 @@ class Compiler:
                 )
 
             self.header["damping"] = self.slot(3 * count, (damping_key,), phis)
+        elif method.integrator.smooth:
+            self.header["damping"] = self.slot(count, (damping_key,), derived.rate)
         else:
             self.header["damping"] = self.slot(
                 count, (damping_key,), lambda value: derived.decay(value, share)
             )
         self.header["damped"] = int(any(p.damping != 1.0 for p in self.particles))
-        stiff = {id(spring.particle) for spring in self.scene.of(StiffSpring)}
+        flows = [] if method.integrator.smooth else self.scene.of(StiffSpring)
+        stiff = {id(spring.particle) for spring in flows}
         self.sections["drift"] = [p for p, x in enumerate(self.particles) if id(x) not in stiff]
         self.header["dt"] = self.constant(method.dt)
 
@@ -282,16 +292,23 @@ class Compiler:
         solver = self.method.solver
         held = solver if self.header["constrained"] else None
         recipe = self.method.integrator.recipe(held)
-        self.sections["recipe"] = [word for part, half in recipe for word in (part.address, half)]
+        self.sections["recipe"] = [word for stage, part in recipe for word in (stage.address, part)]
         self.model.recipe = recipe
         self.header["hasty"] = int(bool(held and held.sparse and self.contacts))
         self.header["contacts_most"] = most = len(self.links) + len(self.contacts)
         self.header["values"] = -1
         if held is not None and not held.staged:
             self.header["values"] = self.take(-(-12 * most // LANES))
-        limit = getattr(solver, "passes", None)
-        self.header["passes"] = getattr(solver, "iterations", 0) if limit is None else limit
-        self.header["tolerance"] = self.constant(getattr(solver, "tolerance", 0.0))
+        settings = solver if held is not None else self.method.integrator
+        limit = getattr(settings, "passes", None)
+        self.header["passes"] = getattr(settings, "iterations", 0) if limit is None else limit
+        self.header["tolerance"] = self.constant(getattr(settings, "tolerance", 0.0))
+        self.header["active"] = self.take(1) if self.method.integrator.reach > 0.0 else self.one
+        self.header["work"] = self.take(self.method.integrator.work * len(self.particles))
+        if self.method.integrator.reach > 0.0:
+            Stiffness(self).build()
+        if self.method.integrator.linear:
+            add_propagators(self)
         generators: list[int] = []
         link = contact = 0
         for thing in self.scene.things:

@@ -16,6 +16,11 @@ def decay(damping: np.ndarray, time: float) -> np.ndarray:
     return damping**time
 
 
+def rate(damping: np.ndarray) -> np.ndarray:
+    """-ln(damping), which is 0, not -0, for no damping."""
+    return np.abs(np.log(damping))
+
+
 def flight(damping: np.ndarray, time: float) -> np.ndarray:
     """e^(-ct), phi1, phi2 of ``integrators.closed_form`` with c = -ln(damping); shape (3, ...)."""
     rate = -np.log(damping.astype(_Extended))

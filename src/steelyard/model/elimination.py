@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from .network import Network
+    from .stiffness import Stiffness
 
 #: Up to so many contacts per world Newton's method on the friction law is worth its dense system.
 DENSE_CONTACTS = 8
@@ -16,7 +17,7 @@ def lower(row: int, column: int) -> int:
     return row * (row + 1) // 2 + column
 
 
-def add_elimination(n: Network) -> None:
+def add_elimination(n: Network | Stiffness) -> None:
     c = n.c
     right = c.header["right"]
     factor: list[int] = []
@@ -25,6 +26,7 @@ def add_elimination(n: Network) -> None:
     for i, block in enumerate(n.order):
         contact = i >= n.structural
         columns = n.pattern[i]
+        coupled = set(columns)
         factor += [
             n.diagonal[i],
             -1 if contact else n.inverse[i],
@@ -33,7 +35,7 @@ def add_elimination(n: Network) -> None:
         ]
         factor.append(len(columns))
         for j in columns:
-            shared = [k for k in n.pattern[j] if k in set(columns) and k < n.structural]
+            shared = [k for k in n.pattern[j] if k in coupled and k < n.structural]
             outer = j >= n.structural
             factor += [
                 n.a[i, j],

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..forces.springs import ONE_SIDED, REST_ALONE, TWO_SIDED
 from ..scene.forces import (
     AnchoredBungee,
     AnchoredSpring,
@@ -17,6 +18,7 @@ from ..scene.forces import (
     StiffSpring,
     UserForce,
 )
+from ..scene.particle import Particle
 from . import derived
 from .parameters import PARTICLES
 
@@ -24,14 +26,24 @@ if TYPE_CHECKING:
     from .compile import Compiler
 
 
+_PLAIN = ("anchor", "stiffness", "damping")
+
+
+def _movable(c: Compiler, particle: Particle) -> int | None:
+    return c.of(particle) if particle.movable else None
+
+
 def add_forces(c: Compiler) -> None:
     """Force rows and a record per force."""
     scene = c.scene
     drags = scene.of(Drag)
-    explicit = c.method.integrator.sums_drag
-    summed = scene.of(
-        Spring, Bungee, AnchoredSpring, AnchoredBungee, Gravity, Buoyancy, UserForce
-    ) or (drags and explicit)
+    integrator = c.method.integrator
+    stiff_springs = scene.of(StiffSpring)
+    summed = (
+        scene.of(Spring, Bungee, AnchoredSpring, AnchoredBungee, Gravity, Buoyancy, UserForce)
+        or (drags and integrator.sums_drag)
+        or (stiff_springs and integrator.smooth and not integrator.linear)
+    )
     c.header["forced"] = int(bool(summed))
     force = c.take(3 * len(c.particles) + 3) if summed else -1
     c.header["force"] = force
@@ -43,9 +55,16 @@ def add_forces(c: Compiler) -> None:
         if isinstance(spring, AnchoredSpring):
             a, b = spring.particle, c.parameter(spring, "anchor", spring.anchor)
             end = spare
+            c.spring_ends.append((_movable(c, a), None))
         else:
             a, b, end = spring.a, c.at("position", spring.b), c.at("force", spring.b)
-        single = int(isinstance(spring, Bungee | AnchoredBungee))
+            c.spring_ends.append((_movable(c, a), _movable(c, spring.b)))
+        kind = TWO_SIDED
+        if isinstance(spring, Bungee | AnchoredBungee):
+            kind = ONE_SIDED
+        elif isinstance(spring, AnchoredSpring) and integrator.linear and a.movable:
+            kind = REST_ALONE
+            c.linear.setdefault(c.of(a), []).append((spring, None, True))
         springs += [
             c.at("position", a),
             b,
@@ -53,7 +72,7 @@ def add_forces(c: Compiler) -> None:
             end,
             stiffness,
             rest,
-            single,
+            kind,
         ]
     c.sections["springs"] = springs
     c.sections["gravities"] = []
@@ -79,7 +98,7 @@ def add_forces(c: Compiler) -> None:
         p = float_.particle
         y, f = c.at("position", p) + 1, c.at("force", p) + 1
         c.sections["buoyancies"] += [y, f, surface, half, lift]
-    share = c.method.integrator.damping_share * c.method.dt
+    share = integrator.damping_share * c.method.dt
     c.sections["drags"] = []
     for drag in drags:
         linear = c.parameter(drag, "linear", drag.linear)
@@ -94,16 +113,38 @@ def add_forces(c: Compiler) -> None:
                     lambda k1, inverse, i=index: derived.drag(k1, inverse[i : i + 1], share)[:, 0],
                 )
                 f = c.at("force", p) if force >= 0 else -1
+                brake = linear
+                if integrator.linear:
+                    # The flow holds what brakes; the wind's push k1 w is like a weight.
+                    c.linear.setdefault(index, []).append((drag, "linear", False))
+                    c.sections["gravities"] += [f, linear, wind]
+                    brake = c.zero
                 c.sections["drags"] += [
-                    c.at("velocity", p), f, linear, quadratic, wind, flow, flow + 1,
+                    c.at("velocity", p), f, brake, quadratic, wind, flow, flow + 1,
                 ]  # fmt: skip
     c.sections["stiff_springs"] = []
-    for stiff in scene.of(StiffSpring):
-        if stiff.particle.movable:
-            _stiff_spring(c, stiff)
-        else:
-            for name in ("anchor", "stiffness", "damping"):
+    for stiff in stiff_springs:
+        if not stiff.particle.movable:
+            for name in _PLAIN:
                 c.parameters.declare((stiff, name), getattr(stiff, name))
+        elif integrator.linear:
+            for name in _PLAIN:
+                c.parameters.declare((stiff, name), getattr(stiff, name))
+            c.linear.setdefault(c.of(stiff.particle), []).append((stiff, "damping", True))
+        elif integrator.smooth:
+            _plain_spring(c, stiff, spare)
+        else:
+            _stiff_spring(c, stiff)
+
+
+def _plain_spring(c: Compiler, spring: StiffSpring, spare: int) -> None:
+    """A stiff spring as an anchored spring of no rest length and a drag in still air."""
+    p = spring.particle
+    x, v, f = (c.at(name, p) for name in ("position", "velocity", "force"))
+    rows = {name: c.parameter(spring, name, getattr(spring, name)) for name in _PLAIN}
+    c.sections["springs"] += [x, rows["anchor"], f, spare, rows["stiffness"], c.zero, 0]
+    c.spring_ends.append((c.of(p), None))
+    c.sections["drags"] += [v, f, rows["damping"], c.zero, c.zero, -1, -1]
 
 
 def _stiff_spring(c: Compiler, spring: StiffSpring) -> None:

@@ -79,8 +79,17 @@ from __future__ import annotations
     H_GUESS,
     H_MASK,
     H_USED_MASK,
-) = range(70)
-HEADER = 70
+    H_WORK,
+    H_ACTIVE,
+    H_REACH,
+    H_MASS,
+    H_UNKNOWNS,
+    H_SPRING_BLOCKS,
+    H_DRAG_BLOCKS,
+    H_FLOAT_BLOCKS,
+    H_PROPAGATORS,
+) = range(79)
+HEADER = 79
 
 # Width of the records of links and contacts; ``model.compile`` writes them field by field.
 LINK = 17

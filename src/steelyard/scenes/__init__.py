@@ -2,6 +2,7 @@
 
 from .ballistic import SHOTS, ballistic
 from .bridge import bridge, bridge_weights
+from .cloth import cloth
 from .loads import bilinear_weights, lumped_masses
 from .platform import platform
 
@@ -11,6 +12,7 @@ __all__ = [
     "bilinear_weights",
     "bridge",
     "bridge_weights",
+    "cloth",
     "lumped_masses",
     "platform",
 ]
