@@ -13,7 +13,7 @@ pytest.importorskip("mujoco")
 pytest.importorskip("pymunk")
 
 import steelyard as sy
-from benchmarks.laboratory import measurement, methods, problems, report
+from benchmarks.laboratory import measurement, methods, problems, report, tables
 from benchmarks.laboratory.engines import BrokenRunError, EngineRun, PeerRun
 from benchmarks.laboratory.measurement import Point
 from benchmarks.laboratory.problem import Motion, Problem, worst
@@ -176,3 +176,28 @@ def test_a_problem_with_two_steps_is_quick() -> None:
     problem = PROBLEMS["pendulum"]
     assert len(problem.quick().steps) == 2 and len(problem.quick().peer_steps or ()) == 1
     assert replace(problem, steps=(3,)).quick().steps == (3,)
+
+
+def test_tables_say_who_wins_and_the_page_is_made_of_the_results(tmp_path: Path) -> None:
+    ours = {"method": "a", "dt": 0.01, "per_second": 2.0, "worst": 1e-3}
+    peer = {"method": "MuJoCo", "dt": 0.001, "per_second": 500.0, "worst": 1e-3}
+    rows = [
+        {"tolerance": 1e-2, "ours": ours, "peer": peer, "ratio": 250.0},
+        {"tolerance": 1e-4, "ours": ours, "peer": {**peer, "per_second": 1.0}, "ratio": 0.5},
+        {"tolerance": 1e-6, "ours": None, "peer": peer, "ratio": None},
+    ]
+    machine = {"cpu": "a core"}
+    made = {"command": "c", "commit": "d" * 40, "machine": machine, "versions": {"numpy": "2"}}
+    document = {"provenance": made, "variants": {"spring": {"by_tolerance": rows}}}
+    (tmp_path / "spring.json").write_text(json.dumps(document), encoding="utf-8")
+    lines = tables.cheapest(tmp_path).splitlines()
+    assert lines[-1] == (
+        "| spring | a at 100 Hz: 2 µs; MuJoCo 250x | a at 100 Hz: 2 µs; **MuJoCo at 1,000 Hz: 1 µs wins: 0.5x** "
+        "| **only MuJoCo at 1,000 Hz: 500 µs** | none |"
+    )
+    page = tables.PAGE.read_text(encoding="utf-8")
+    assert "`c`, commit dddddddddddd, one core of a core, numpy 2." in tables.render(page, tmp_path)
+    # The page in the repository is that of the results in it.
+    assert tables.render(page) == page
+    for name in problems.NAMES:
+        assert f"charts/{name}.png" in page and (tables.CHARTS / f"{name}.png").exists()

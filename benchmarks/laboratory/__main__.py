@@ -1,6 +1,6 @@
 """Measure the reference problems and draw their charts.
 
-    python -m benchmarks.laboratory [NAME ...] [--quick] [--output FOLDER]
+    python -m benchmarks.laboratory [NAME ...] [--quick | --redraw] [--output FOLDER]
 
 Results go to benchmarks/results/charts, a JSON file and a picture per problem; without names all problems
 are measured and an overview is drawn too.
@@ -34,6 +34,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "--quick", action="store_true", help="show that all runs, in seconds; measures nothing"
     )
+    parser.add_argument(
+        "--redraw", action="store_true", help="draw again what was measured; measures nothing"
+    )
     parser.add_argument("--output", type=Path, help="folder of the results")
     chosen = parser.parse_args(arguments)
     unknown = sorted(set(chosen.names) - set(problems.NAMES))
@@ -51,7 +54,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         console.print(f"{time.perf_counter() - start:6.0f} s  {name}", highlight=False)
 
     names = tuple(dict.fromkeys(chosen.names)) or problems.NAMES
-    run(names, quick=chosen.quick, output=output, announce=announce, overview=not chosen.names)
+    run(
+        names,
+        quick=chosen.quick,
+        output=output,
+        announce=announce,
+        overview=not chosen.names,
+        redraw=chosen.redraw,
+    )
     announce(f"done: {output}")
     return 0
 

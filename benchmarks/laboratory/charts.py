@@ -9,7 +9,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
-from matplotlib.ticker import LogLocator
+from matplotlib.ticker import LogLocator, NullFormatter
 
 from benchmarks.laboratory import methods
 from benchmarks.laboratory.measurement import Point, curves, order
@@ -21,7 +21,7 @@ MARKS = ("o", "^", "D", "v", "P", "X")
 PEER_COLOURS = ("#000000", "#555555", "#999999")
 PEER_MARKS = ("s", "*", "h", "<")
 #: Errors are drawn within these bounds: below all is rounding, above it is another motion.
-SHOWN = (1e-16, 10.0)
+SHOWN = (1e-16, 1.0)
 FRAME = 1.0 / 60.0
 
 Measured = Mapping[str, tuple[Problem, Sequence[Point]]]
@@ -45,8 +45,7 @@ def draw(measured: Measured, path: Path, *, title: str, note: str) -> None:
                 panel.axis("off")
                 continue
             _draw_panel(panel, points, styles, lambda p, name=name: p.errors[name])
-            unit = units[name] if units[name] != "share" else "share of the whole"
-            panel.set_xlabel(f"error of the {name} [{unit}]")
+            panel.set_xlabel(f"error of the {name} [{units[name]}]")
             if column == 0:
                 panel.set_ylabel("CPU time per simulated\nsecond and world [µs]")
                 panel.set_title(variant, loc="left", fontsize=10)
@@ -69,7 +68,7 @@ def draw(measured: Measured, path: Path, *, title: str, note: str) -> None:
         )
     figure.suptitle(title, x=0.01, y=1.0 - 0.15 / height, ha="left", va="top")
     figure.text(0.01, 0.08 / height, note, fontsize=8, color="#444444", va="bottom")
-    figure.tight_layout(rect=(0.0, 0.25 / height, 1.0, 1.0 - 0.4 / height))
+    figure.tight_layout(rect=(0.0, 0.25 / height, 1.0, 1.0))
     figure.savefig(path, dpi=110)
     plt.close(figure)
 
@@ -96,7 +95,7 @@ def overview(measured: Measured, path: Path, *, title: str, note: str) -> None:
     handles.append(_handle(("#555555", "s", "--", False), "peers (see each problem's chart)"))
     figure.suptitle(title, x=0.01, y=1.0 - 0.15 / height, ha="left", va="top")
     figure.text(0.01, 0.08 / height, note, fontsize=8, color="#444444", va="bottom")
-    figure.tight_layout(rect=(0.0, 1.5 / height, 1.0, 1.0 - 0.4 / height))
+    figure.tight_layout(rect=(0.0, 1.5 / height, 1.0, 1.0))
     figure.legend(
         handles=handles,
         loc="lower left",
@@ -148,7 +147,7 @@ def _failures(points: Sequence[Point]) -> list[str]:
     """What has no curve, since it never follows the motion."""
     followed = {point.method for point in points if point.worst <= SHOWN[1]}
     failed = dict.fromkeys(point.method for point in points if point.method not in followed)
-    return [f"{name}: fails at every step" for name in failed]
+    return [f"{name}: lost at every step" for name in failed]
 
 
 def _draw_panel(
@@ -163,8 +162,7 @@ def _draw_panel(
         colour, mark, line, _ = styles[name]
         x = np.clip([error(point) for point in curve], *SHOWN)
         y = [point.per_second for point in curve]
-        frame = min(curve, key=lambda point: abs(np.log(point.dt / FRAME)))
-        sizes = [60.0 if point is frame else 16.0 for point in curve]
+        sizes = [60.0 if abs(point.dt / FRAME - 1.0) < 0.3 else 16.0 for point in curve]
         panel.plot(x, y, line, color=colour, linewidth=1.2, alpha=0.9)
         panel.scatter(x, y, s=sizes, color=colour, marker=mark, zorder=3, linewidths=0.0)
     for point in points:
@@ -184,5 +182,11 @@ def _draw_panel(
     panel.set_yscale("log")
     panel.xaxis.set_major_locator(LogLocator(numticks=8))
     panel.yaxis.set_major_locator(LogLocator(numticks=8))
+    panel.xaxis.set_minor_formatter(NullFormatter())
+    panel.yaxis.set_minor_formatter(NullFormatter())
+    # At least three decades: what hardly changes shall look so.
+    low, high = panel.get_xlim()
+    wider = max(0.5 * (3.0 - np.log10(high / low)), 0.0)
+    panel.set_xlim(low * 10.0**-wider, high * 10.0**wider)
     panel.tick_params(labelsize=8)
     panel.grid(True, which="major", alpha=0.25)

@@ -166,7 +166,7 @@ def order(curve: Sequence[Point]) -> float | None:
         return None
     slope = float(np.polyfit(np.log(dt), np.log(error), 1)[0])
     # An error that grows as the step falls is rounding that piles up.
-    return slope if slope > -0.1 else None
+    return max(slope, 0.0) if slope > -0.1 else None
 
 
 def by_tolerance(points: Sequence[Point]) -> list[dict[str, Any]]:

@@ -79,7 +79,8 @@ def _peers(restitution: float) -> dict[str, Peer]:
     # MuJoCo has no restitution: a contact is a spring whose damping ratio z gives
     # e = exp(-pi z / sqrt(1 - z^2)). A bounce is made to last ten steps.
     log = -math.log(restitution)
-    ratio = log / math.hypot(math.pi, log)
+    # A damping of exactly zero would be read as MuJoCo's other way to state a contact.
+    ratio = max(log / math.hypot(math.pi, log), 1e-9)
     radius = 0.01
 
     def document(dt: float, integrator: str) -> str:
