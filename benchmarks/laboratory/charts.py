@@ -184,9 +184,12 @@ def _draw_panel(
     panel.yaxis.set_major_locator(LogLocator(numticks=8))
     panel.xaxis.set_minor_formatter(NullFormatter())
     panel.yaxis.set_minor_formatter(NullFormatter())
-    # At least three decades: what hardly changes shall look so.
-    low, high = panel.get_xlim()
-    wider = max(0.5 * (3.0 - np.log10(high / low)), 0.0)
-    panel.set_xlim(low * 10.0**-wider, high * 10.0**wider)
+    # At least so many decades: what hardly changes shall look so.
+    for decades, limits, widen in (
+        (3.0, panel.get_xlim(), panel.set_xlim),
+        (2.0, panel.get_ylim(), panel.set_ylim),
+    ):
+        wider = max(0.5 * (decades - np.log10(limits[1] / limits[0])), 0.0)
+        widen(limits[0] * 10.0**-wider, limits[1] * 10.0**wider)
     panel.tick_params(labelsize=8)
     panel.grid(True, which="major", alpha=0.25)

@@ -77,7 +77,7 @@ def problems() -> tuple[Problem, ...]:
                 energy(true, particle_energy(described), scale=weight),
                 links(described),
             ),
-            steps=(3, 6, 12, 24, 48, 96, 192, 384),
+            steps=(3, 6, 12, 24, 48, 96, 192, 384, 1024),
             peers={
                 **{f"{name}, hinge": peer for name, peer in hinge.items()},
                 **{

@@ -44,7 +44,7 @@ def problems() -> tuple[Problem, ...]:
                 energy(true, particle_energy(scene), scale=kinetic),
                 links(scene),
             ),
-            steps=(2, 3, 6, 12, 24, 48, 96, 192, 384),
+            steps=(2, 3, 6, 12, 24, 48, 96, 192, 512),
             peers={**free_body(scene), **mujoco_particles(scene)},
             peer_steps=(3, 6, 12, 24, 48, 96),
             best="RATTLE, direct",

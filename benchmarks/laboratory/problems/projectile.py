@@ -139,7 +139,7 @@ def problems() -> tuple[Problem, ...]:
                 trajectory(quadratic_drag(STRETCH * np.array(_looks(braked)))),
                 impact(end),
             ),
-            steps=(1, 2, 4, 8, 16),
+            steps=(1, 2, 4, 8, 16, 48),
             peers=_pymunk(QUADRATIC, 1.0),
             best="velocity Verlet",
             wrong={

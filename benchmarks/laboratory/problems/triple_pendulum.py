@@ -12,7 +12,7 @@ def problems() -> tuple[Problem, ...]:
         chain_problem(
             "triple pendulum",
             "triple",
-            steps=(3, 6, 12, 24, 48, 96, 192, 384),
+            steps=(3, 6, 12, 24, 48, 96, 192, 384, 1024),
             peer_steps=(3, 6, 12, 24, 48, 96),
         ),
     )
