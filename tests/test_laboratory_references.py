@@ -211,7 +211,9 @@ def test_chains_by_the_forces_of_their_rods_in_space(name: str) -> None:
     position, velocity = taut_motion(scene, masses, chain.times[0], tolerance=tolerance)
     stored = pendulums.stored(name)
     np.testing.assert_allclose(stored.position[: len(looks)], position, rtol=0, atol=1e-10)
-    np.testing.assert_allclose(stored.velocity[: len(looks)], velocity, rtol=0, atol=1e-8)
+    # Light links under a heavy end vibrate at up to 34,000 rad/s: 1e-11 m are 3e-7 m/s.
+    speed = 3e-7 if name == "chain_1e+06" else 1e-8
+    np.testing.assert_allclose(stored.velocity[: len(looks)], velocity, rtol=0, atol=speed)
 
 
 def test_stored_motions_are_what_their_program_makes() -> None:
