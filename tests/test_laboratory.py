@@ -41,14 +41,12 @@ def best(problem: Problem) -> tuple[sy.Scene, methods.Entry]:
     return problem.scene(), methods.named(problem.best)
 
 
-@pytest.mark.parametrize(
-    "name", [name for name in PROBLEMS if "1e+06" not in name or "spring" in name]
-)
+@pytest.mark.parametrize("name", PROBLEMS)
 def test_a_wrong_engine_is_caught(name: str) -> None:
     problem = PROBLEMS[name]
     right = worst(problem.errors(motion(problem, *best(problem))))
     coarse = name.startswith(COARSE)
-    assert right < (2e-2 if coarse else 2e-4)
+    assert right < (2e-2 if coarse else 3e-4)
     defects = {defect: build() for defect, build in problem.wrong.items()}
     assert len(defects) >= 3
     for defect, scene in defects.items():
@@ -71,12 +69,10 @@ def test_a_wrong_order_of_update_is_caught(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", PROBLEMS)
-def test_the_true_motion_has_no_error(name: str) -> None:
-    # Each engine starts where the reference does: what a step of next to no time leaves is none either.
+def test_peers_start_where_the_problem_does(name: str) -> None:
     problem = PROBLEMS[name]
     scene = problem.scene()
     assert problem.looks == tuple(sorted(set(problem.looks)))
-    assert len(scene.particles) >= 1
     for peer in problem.peers.values():
         stepper = peer(problem.stretch / problem.steps[0])
         position, velocity = stepper.state()

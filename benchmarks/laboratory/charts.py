@@ -133,7 +133,8 @@ def _styles(measured: Measured) -> dict[str, Style]:
                     COLOURS[k % len(COLOURS)], MARKS[(k + k // len(COLOURS)) % len(MARKS)], "-", True
                 )  # fmt: skip
             else:
-                found[name] = (COLOURS[-1 - forms % len(COLOURS)], MARKS[-1 - forms % 6], ":", True)
+                colour = COLOURS[(3 + forms) % len(COLOURS)]
+                found[name] = (colour, MARKS[-1 - forms % len(MARKS)], ":", True)
                 forms += 1
     return found
 

@@ -9,9 +9,9 @@ a_i = g + (T_(i+1) u_(i+1) - T_i u_i) / m_i. Rods keep their length: u_i . (a_i 
 tridiagonal in the tensions and well conditioned for any masses, unlike the matrix of masses in the angles; then
 l_i theta_i'' is the component across the rod. Integrated by DOP853 near the limit of double precision.
 
-How far they can be trusted: end x 1 and x 1000 agree with multipliers in space to 7e-13 m over the whole second. End x 1e6
-takes three minutes at a tolerance of 1e-12, agrees with one of 1e-11 to 9.4e-11 m, and with multipliers in space over the first
-.2 s to 1e-10 m; beyond, that check is left to who has the time.
+How far they can be trusted: end x 1 and x 1000 agree with multipliers in space to 7e-13 m over the whole
+second. End x 1e6 takes three minutes at a tolerance of 1e-12, agrees with one of 1e-11 to 9.4e-11 m, and with
+multipliers in space to 1e-10 m over the first .2 s; beyond, that check takes long and was not made.
 """
 
 from __future__ import annotations

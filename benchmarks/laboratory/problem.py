@@ -72,7 +72,8 @@ class Problem:
         steps: Ladder of steps, as steps per stretch, rising.
         peers: Other engines that can do it, by name; they get the same ladder or `peer_steps`.
         peer_steps: Ladder of the peers where it is another.
-        forms: Other ways to write the same physics, by name: each is charted as methods of its own.
+        forms: Other ways to write the same physics, by name; each is charted with one method, the one
+            that `best` names with it or velocity Verlet.
         omitted: Methods that are not charted, with the reason.
         best: Name of a method that follows the motion, for tests.
         wrong: What a defective engine would do, by the defect: scenes that differ from the true one
