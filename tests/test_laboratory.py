@@ -48,12 +48,17 @@ def test_a_wrong_engine_is_caught(name: str) -> None:
     coarse = name.startswith(COARSE)
     assert right < (2e-2 if coarse else 3e-4)
     defects = {defect: build() for defect, build in problem.wrong.items()}
-    assert len(defects) >= 3
+    told = 0
     for defect, scene in defects.items():
         held = bool(scene.of(*methods.HELD))
         entry = methods.named("RATTLE, direct" if held else "velocity Verlet")
-        found = worst(problem.errors(motion(problem, scene, entry)))
+        try:
+            found = worst(problem.errors(motion(problem, scene, entry)))
+        except BrokenRunError:
+            continue  # it says so itself, and proves nothing of the measures
         assert found > (3.0 if coarse else 20.0) * right, (defect, found, right)
+        told += 1
+    assert told >= 3
 
 
 @pytest.mark.parametrize(
