@@ -200,14 +200,9 @@ def _energy(scene: ParticleScene, position: Array, velocity: Array) -> Array:
 
 
 def _strain(scene: ParticleScene, position: Array) -> float:
-    worst = 0.0
-    for a, b, length in scene.rods:
-        distance = np.linalg.norm(position[:, a] - position[:, b], axis=1)
-        worst = max(worst, float(np.abs(distance / length - 1.0).max()))
-    for a, b, length in scene.cables:
-        distance = np.linalg.norm(position[:, a] - position[:, b], axis=1)
-        worst = max(worst, float((distance / length - 1.0).max()))
-    for p, anchor, length in scene.supports:
-        distance = np.linalg.norm(position[:, p] - np.asarray(anchor), axis=1)
-        worst = max(worst, float((distance / length - 1.0).max()))
-    return worst
+    incidence, anchor, length = scene.spans()
+    span = np.linalg.norm(np.einsum("lp,tpc->tlc", incidence, position) - anchor, axis=2)
+    strain = span / length - 1.0
+    rigid = len(scene.rods) + len(scene.pins)
+    strain[:, :rigid] = np.abs(strain[:, :rigid])
+    return float(strain.max(initial=0.0))

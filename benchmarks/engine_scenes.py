@@ -7,7 +7,7 @@ from benchmarks.scenes import ParticleScene
 
 
 def build(scene: ParticleScene) -> sy.Scene:
-    """The same particles and links, in the same order: rods, cables, supports.
+    """The same particles and links, in the same order: rods, pins, cables, supports.
 
     Cables do not rebound, as those of the peers do not.
     """
@@ -22,6 +22,8 @@ def build(scene: ParticleScene) -> sy.Scene:
     ]
     for a, b, length in scene.rods:
         built.add(sy.Rod(particles[a], particles[b], length=length))
+    for p, anchor, length in scene.pins:
+        built.add(sy.RodConstraint(particles[p], anchor=anchor, length=length))
     for a, b, length in scene.cables:
         built.add(sy.Cable(particles[a], particles[b], max_length=length))
     for p, anchor, length in scene.supports:

@@ -57,13 +57,8 @@ def taut_motion(
         ArithmeticError: A cable goes slack, so the motion is another one.
     """
     count = len(scene.mass)
-    pairs = [*scene.rods, *scene.cables]
-    rows = len(pairs) + len(scene.supports)
-    incidence, anchor = np.zeros((rows, count)), np.zeros((rows, 3))
-    for row, (a, b, _) in enumerate(pairs):
-        incidence[row, a], incidence[row, b] = 1.0, -1.0
-    for row, (p, point, _) in enumerate(scene.supports, start=len(pairs)):
-        incidence[row, p], anchor[row] = 1.0, point
+    incidence, anchor, length = scene.spans()
+    rows = len(length)
     gravity, damping = np.asarray(scene.gravity), -np.log(scene.damping)
 
     def acceleration(position: Array, velocity: Array, mass: Array) -> tuple[Array, Array]:
@@ -87,7 +82,7 @@ def taut_motion(
             change, (0.0, stretch), state.ravel(), method="DOP853", rtol=tolerance, atol=tolerance
         )
         state = solution.y[:, -1].reshape(2, count, 3)
-        pull = acceleration(state[0], state[1], mass)[1][len(scene.rods) :]
+        pull = acceleration(state[0], state[1], mass)[1][len(scene.rods) + len(scene.pins) :]
         if pull.size and pull.min() < 0.0:
             raise ArithmeticError(
                 f"A cable goes slack {(len(visited) + 1) * stretch:.3g} s after the start: this "

@@ -12,6 +12,7 @@ import sys
 import time
 from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
+from functools import cache
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -113,7 +114,9 @@ def _command() -> str:
     return shlex.join([*program.split(), *sys.argv[1:]])
 
 
+@cache
 def _commit() -> str | None:
+    """The commit when it is first asked for: results that are written later do not count as changes."""
     head = _git("rev-parse", "HEAD")
     if head is None:
         return None

@@ -122,15 +122,8 @@ def equilibrium(scene: ParticleScene) -> Equilibrium:
         ArithmeticError: The iteration did not settle, or a cable would have to push.
     """
     count = len(scene.mass)
-    pairs = [*scene.rods, *scene.cables]
-    length = np.array([link[2] for link in (*pairs, *scene.supports)])
     # The vectors along the links are incidence @ position - anchor.
-    incidence = np.zeros((len(length), count))
-    anchor = np.zeros((len(length), 3))
-    for row, (a, b, _) in enumerate(pairs):
-        incidence[row, a], incidence[row, b] = 1.0, -1.0
-    for row, (p, point, _) in enumerate(scene.supports, start=len(pairs)):
-        incidence[row, p], anchor[row] = 1.0, point
+    incidence, anchor, length = scene.spans()
     weight = np.outer(scene.mass, scene.gravity)
     position = scene.position.copy()
     density = np.ones(len(length))
@@ -155,15 +148,17 @@ def equilibrium(scene: ParticleScene) -> Equilibrium:
         raise ArithmeticError(f"The statics did not settle: residual {residual} after 100 steps.")
     tension = density * length
     rods = len(scene.rods)
-    if tension[rods:].size and tension[rods:].min() < 0.0:
+    cables = rods + len(scene.pins)
+    supports = cables + len(scene.cables)
+    if tension[cables:].size and tension[cables:].min() < 0.0:
         raise ArithmeticError(
-            f"A cable would push with {-tension[rods:].min()} N: it hangs slack, leave it out."
+            f"A cable would push with {-tension[cables:].min()} N: it hangs slack, leave it out."
         )
     return Equilibrium(
         position=position,
         rod_tension=tension[:rods],
-        cable_tension=tension[rods : len(pairs)],
-        support_tension=tension[len(pairs) :],
+        cable_tension=tension[cables:supports],
+        support_tension=tension[supports:],
         residual=residual,
     )
 

@@ -30,6 +30,7 @@ class ParticleScene:
         velocity: Particle velocities [m/s], shape (particles, 3).
         mass: Particle masses [kg], shape (particles,).
         rods: Links of fixed length, as (particle, particle, length [m]).
+        pins: Links of fixed length to fixed points, as (particle, anchor [m], length [m]).
         cables: Links of bounded length, as (particle, particle, greatest length [m]).
         supports: Cables to fixed points, as (particle, anchor [m], greatest length [m]).
         gravity: Acceleration of every particle [m/s^2].
@@ -40,10 +41,28 @@ class ParticleScene:
     velocity: Array
     mass: Array
     rods: tuple[Pair, ...] = ()
+    pins: tuple[Support, ...] = ()
     cables: tuple[Pair, ...] = ()
     supports: tuple[Support, ...] = ()
     gravity: tuple[float, float, float] = STANDARD_GRAVITY
     damping: float = 1.0
+
+    def spans(self) -> tuple[Array, Array, Array]:
+        """All links in the order rods, pins, cables, supports.
+
+        Returns:
+            Matrix and anchors [m] of which `matrix @ position - anchors` are the vectors along the
+            links, shapes (links, particles) and (links, 3), and the lengths [m], shape (links,).
+        """
+        links = [*self.rods, *self.pins, *self.cables, *self.supports]
+        matrix, anchor = np.zeros((len(links), len(self.mass))), np.zeros((len(links), 3))
+        for row, (a, b, _) in enumerate(links):
+            matrix[row, a] = 1.0
+            if isinstance(b, int):
+                matrix[row, b] = -1.0
+            else:
+                anchor[row] = b
+        return matrix, anchor, np.array([length for _, _, length in links])
 
 
 def tumbling_platform() -> ParticleScene:

@@ -95,8 +95,9 @@ def mjcf(
         )
     for p, (position, mass) in enumerate(zip(scene.position, scene.mass, strict=True)):
         _add_particle(world, p, position, float(mass), _joint_damping(scene, float(mass)))
-    for c, (_, anchor, _) in enumerate(scene.supports):
-        ET.SubElement(world, "site", name=f"anchor{c}", pos=_text(anchor))
+    for kind, links in (("pin", scene.pins), ("anchor", scene.supports)):
+        for c, (_, anchor, _) in enumerate(links):
+            ET.SubElement(world, "site", name=f"{kind}{c}", pos=_text(anchor))
     _add_links(root, scene, solref)
     return ET.tostring(root, encoding="unicode")
 
@@ -155,12 +156,23 @@ def _add_particle(
 def _add_links(root: ET.Element, scene: ParticleScene, solref: tuple[float, float] | None) -> None:
     tendon = ET.SubElement(root, "tendon")
     equality = ET.SubElement(root, "equality")
-    for c, (a, b, length) in enumerate(scene.rods):
-        _add_tendon(tendon, f"rod{c}", f"particle{a}", f"particle{b}")
+    rods = [
+        *(
+            (f"rod{c}", f"particle{a}", f"particle{b}", length, scene.position[b])
+            for c, (a, b, length) in enumerate(scene.rods)
+        ),
+        *(
+            (f"held{c}", f"particle{a}", f"pin{c}", length, np.asarray(point))
+            for c, (a, point, length) in enumerate(scene.pins)
+        ),
+    ]
+    for name, site_a, site_b, length, end in rods:
+        _add_tendon(tendon, name, site_a, site_b)
         # The constraint measures from the length in the initial pose.
-        stretch = length - float(np.linalg.norm(scene.position[a] - scene.position[b]))
+        start = scene.position[int(site_a.removeprefix("particle"))]
+        stretch = length - float(np.linalg.norm(start - end))
         rod = ET.SubElement(
-            equality, "tendon", tendon1=f"rod{c}", polycoef=_text((stretch, 1.0, 0.0, 0.0, 0.0))
+            equality, "tendon", tendon1=name, polycoef=_text((stretch, 1.0, 0.0, 0.0, 0.0))
         )
         if solref is not None:
             rod.set("solref", _text(solref))

@@ -1,0 +1,28 @@
+"""The reference problems, a file each."""
+
+from __future__ import annotations
+
+from importlib import import_module
+
+from benchmarks.laboratory.problem import Problem
+
+NAMES = (
+    "projectile",
+    "spring",
+    "bungee",
+    "buoyancy",
+    "pendulum",
+    "triple_pendulum",
+    "chain",
+    "platform",
+    "bridge",
+    "catenary",
+    "collision",
+    "bouncing_ball",
+)
+
+
+def load(name: str) -> tuple[Problem, ...]:
+    """The variants of a problem."""
+    variants: tuple[Problem, ...] = import_module(f"{__name__}.{name}").problems()
+    return variants
