@@ -302,6 +302,7 @@ class Compiler:
         settings = solver if held is not None else self.method.integrator
         limit = getattr(settings, "passes", None)
         self.header["passes"] = getattr(settings, "iterations", 0) if limit is None else limit
+        self.header["repeats"] = getattr(solver, "repeats", 0)
         self.header["tolerance"] = self.constant(getattr(settings, "tolerance", 0.0))
         self.header["active"] = self.take(1) if self.method.integrator.reach > 0.0 else self.one
         self.header["work"] = self.take(self.method.integrator.work * len(self.particles))

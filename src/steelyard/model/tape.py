@@ -34,6 +34,7 @@ from __future__ import annotations
     H_CONTACTS_MOST,
     H_RECIPE,
     H_SINGLES,
+    H_REPEATS,
     H_PASSES,
     H_TOLERANCE,
     H_CONSTRAINED,
@@ -88,8 +89,8 @@ from __future__ import annotations
     H_DRAG_BLOCKS,
     H_FLOAT_BLOCKS,
     H_PROPAGATORS,
-) = range(79)
-HEADER = 79
+) = range(80)
+HEADER = 80
 
 # Width of the records of links and contacts; ``model.compile`` writes them field by field.
 LINK = 17

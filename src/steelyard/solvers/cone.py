@@ -23,6 +23,7 @@ from ..model.tape import (
     H_DT,
     H_GUESS,
     H_MASK,
+    H_REPEATS,
     H_RIGHT,
     H_TOTAL,
 )
@@ -31,7 +32,6 @@ from .cone_newton import newton, softened_motion
 from .cone_rows import relative_motion
 
 _SWEEPS = 200
-_REPEATS = 4
 _ANCHORS = 3
 # Share of the allowed error that softness may leave.
 _PULL = 1e-3
@@ -59,8 +59,9 @@ def factorise_contacts(tape, s, skip, softness):
 def _stick(tape, s, skip, first):
     """Solve W l = b over the masked rows into the guess rows.
 
-    Repeating the solve on what is left of b takes the factor's softness out (the proximal point method). The
-    ``first`` of a stage's passes starts from nothing, which spreads friction evenly, others from the guess.
+    Repeating the solve on what is left of b takes the factor's softness out (the proximal point method), as often as
+    the tolerance asks. The ``first`` of a stage's passes starts from nothing, which spreads friction evenly, others
+    from the guess.
     """
     zero = splat(0.0)
     at = tape[H_CONTACTS]
@@ -71,7 +72,7 @@ def _stick(tape, s, skip, first):
         for row in range(slot, slot + 3):
             value = zero if first else load(s, guess + row) * load(s, tape[H_MASK] + row)
             store(s, total + row, value)
-    for repeat in range(_REPEATS):
+    for repeat in range(tape[H_REPEATS]):
         k = tape[H_CONTACT_PRODUCTS] + 1
         for index in range(tape[at]):
             contact = at + 1 + CONTACT * index
@@ -119,10 +120,11 @@ def _violated(tape, s, skip, velocity):
             loaded = load(s, tape[H_MASK] + slot) > half
             guess = tape[H_GUESS] + slot
             n = load(s, guess)
-            a, _, _ = relative_motion(tape, s, skip, k, tape[H_GUESS])
-            opening = a - load(s, tape[H_RIGHT] + slot)
-            possible = load(s, tape[contact + 18]) > half
-            closes = possible & (load(s, tape[H_MASK] + slot) < half) & (opening < splat(-1e-13))
+            idle = (load(s, tape[contact + 18]) > half) & (load(s, tape[H_MASK] + slot) < half)
+            if any_lane(idle):
+                a, _, _ = relative_motion(tape, s, skip, k, tape[H_GUESS])
+                opening = a - load(s, tape[H_RIGHT] + slot)
+                bad = bad | (idle & (opening < splat(-1e-13)))
             t = load(s, guess + 1)
             u = load(s, guess + 2)
             bound = load(s, tape[contact + 14]) * select(n > zero, n, zero)
@@ -130,7 +132,7 @@ def _violated(tape, s, skip, velocity):
             pulls = n < zero
             if velocity:
                 pulls = pulls & (load(s, tape[contact + 18] + 3) < half)
-            bad = bad | closes | (loaded & (pulls | slips))
+            bad = bad | (loaded & (pulls | slips))
         k += 5 + 4 * tape[k + 4]
     return bad
 
@@ -283,7 +285,7 @@ def solve_contacts(tape, s, skip, velocity, allowed, softness, first, hasty):
             _anchor(tape, s, skip)
             failed = bad
             if tape[H_DENSE] >= 0:
-                failed = newton(tape, s, skip, velocity, bad, softness)
+                failed = newton(tape, s, skip, velocity, bad, allowed, softness)
             if any_lane(failed):
                 failed = _sweep(tape, s, skip, velocity, failed, allowed, softness)
             stuck = failed | (stuck & (select(bad, zero, one) > zero))

@@ -20,6 +20,8 @@ from .cone_rows import add_motion_row, relative_motion
 
 _ITERATIONS = 15
 _SETTLED = 1e-11
+# Share of the allowed motion that errors may make.
+_SHARE = 1e-3
 
 
 @inner
@@ -39,7 +41,7 @@ def softened_motion(tape, s, skip, contact, k, softness):
 
 @inner
 def _scales(s, w, soft):
-    """r_n and r_t: inverses of the contact's own stiffness of motion."""
+    """r_n and r_t, inverses of the motion that a contact's own unit impulse makes; that motion."""
     zero = splat(0.0)
     one = splat(1.0)
     w00 = load(s, w) + soft
@@ -47,12 +49,12 @@ def _scales(s, w, soft):
     w22 = load(s, w + 5) + soft
     size = select(w11 > w22, w11, w22) + absolute(load(s, w + 4))
     normal = select(w00 > zero, one / w00, zero)
-    return normal, select(size > zero, one / size, zero)
+    return normal, select(size > zero, one / size, zero), w00, size
 
 
 @inner
 def _contact_system(tape, s, skip, contact, k, velocity, first, width, softness):
-    """Three rows of the system for one contact; its error and the size of its impulse."""
+    """Three rows of the system for one contact; its error, the size of its impulse, the motion that the error makes."""
     zero = splat(0.0)
     one = splat(1.0)
     half = splat(0.5)
@@ -67,7 +69,7 @@ def _contact_system(tape, s, skip, contact, k, velocity, first, width, softness)
     t = load(s, guess + 1)
     u = load(s, guess + 2)
     soft = splat(softness) * load(s, tape[k + 3])
-    rn, rt = _scales(s, tape[k + 1], soft)
+    rn, rt, motion_n, motion_t = _scales(s, tape[k + 1], soft)
     possible = load(s, tape[contact + 18]) > half
     loads = n - rn * un > zero
     if velocity:
@@ -116,8 +118,10 @@ def _contact_system(tape, s, skip, contact, k, velocity, first, width, softness)
     error_u = select(slides, u - bound * eu, select(sticks, rt * uu, u))
     store(s, next_ + last, zero - error_t)
     store(s, other + last, zero - error_u)
-    error = absolute(normal_error) + absolute(error_t) + absolute(error_u)
-    return error, absolute(n) + absolute(t) + absolute(u)
+    tangential = absolute(error_t) + absolute(error_u)
+    error = absolute(normal_error) + tangential
+    moved = fma(motion_t, tangential, motion_n * absolute(normal_error))
+    return error, absolute(n) + absolute(t) + absolute(u), moved
 
 
 @inner
@@ -148,8 +152,11 @@ def _eliminate(s, dense, size):
 
 
 @inner
-def newton(tape, s, skip, velocity, worlds, softness):
-    """Improve the guess rows of ``worlds``; the worlds that still miss the law afterwards."""
+def newton(tape, s, skip, velocity, worlds, allowed, softness):
+    """Improve the guess rows of ``worlds``; the worlds that still miss the law afterwards.
+
+    They meet it where errors move contacts by little beside ``allowed``, or are rounding beside the impulses.
+    """
     zero = splat(0.0)
     one = splat(1.0)
     at = tape[H_CONTACTS]
@@ -161,14 +168,16 @@ def newton(tape, s, skip, velocity, worlds, softness):
     for turn in range(_ITERATIONS + 1):
         error = zero
         largest = splat(1e-300)
+        most = zero
         k = tape[H_CONTACT_PRODUCTS] + 1
         for index in range(count):
             contact = at + 1 + CONTACT * index
             if skip[tape[contact + 20]] == 0:
-                wrong, extent = _contact_system(
+                wrong, extent, moved = _contact_system(
                     tape, s, skip, contact, k, velocity, first, width, softness
                 )
                 error = error + wrong
+                most = select(moved > most, moved, most)
                 largest = select(extent > largest, extent, largest)
             else:
                 row = tape[H_DENSE] + 3 * index * width
@@ -177,7 +186,7 @@ def newton(tape, s, skip, velocity, worlds, softness):
                 for axis in range(3):
                     store(s, row + axis * width + 3 * index + axis, one)
             k += 5 + 4 * tape[k + 4]
-        moving = moving & (error > splat(_SETTLED) * largest)
+        moving = moving & (error > splat(_SETTLED) * largest) & (most > splat(_SHARE) * allowed)
         if turn == _ITERATIONS or not any_lane(moving):
             break
         _eliminate(s, tape[H_DENSE], size)

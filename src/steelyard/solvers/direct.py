@@ -11,6 +11,7 @@ converged is frozen: no result depends on its neighbours.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -64,6 +65,7 @@ _RETRIES = 4
 # Contacts that rigid things join share friction in more ways than one, and what is still to be solved makes them
 # contradict one another: a harder compliance answers that with larger opposing forces.
 _SOFT, _HARD = 1e-3, 1e-5
+_MOST_REPEATS = 4
 
 
 @dataclass(frozen=True)
@@ -78,6 +80,13 @@ class Direct(Solver):
     tolerance: float = 1e-12
     passes: int = 60
     sparse: ClassVar[bool] = True
+
+    @property
+    def repeats(self) -> int:
+        """Solves of contacts that take their softness out, each by its factor, to a thousandth of the tolerance."""
+        # A centimetre is more than a contact has to make up for in a step.
+        wanted = math.log(0.1 * self.tolerance) / math.log(_SOFT)
+        return max(1, min(_MOST_REPEATS, math.ceil(wanted - 1e-9)))
 
     @property
     def stage(self) -> Stage:
