@@ -140,12 +140,13 @@ class TaskVectorEnv(gym.vector.VectorEnv[Array, Array, Array]):
         given[:] = actions
         again = self._done if self.autoreset_mode == AutoresetMode.NEXT_STEP else None
         if again is not None and again.any():
-            streams = task.streams[:, again]
+            rows = np.flatnonzero(again)
+            streams = task.streams[:, rows]
             task.step(given)
             # What a finished row did in this step is dropped, the random numbers it drew included.
-            task.streams[:, again] = streams
-            task.rewards[:, again] = 0.0
-            task.flags[:, again] = False
+            task.streams[:, rows] = streams
+            task.rewards[:, rows] = 0.0
+            task.flags[:, rows] = False
             task.start(again)
             ended = 1
         else:
@@ -181,14 +182,13 @@ class TaskVectorEnv(gym.vector.VectorEnv[Array, Array, Array]):
     def _info(self, rows: Array) -> dict[str, Any]:
         """Reward terms and flags of ``rows`` (num_envs,) bool, in Gymnasium's form; others are 0."""
         task = self.task
-        info: dict[str, Any] = {}
-        for k, name in enumerate(self._names):
-            info[name] = task.rewards[1 + k] * rows
-            info[f"_{name}"] = rows.copy()
-        for name, row in (("is_success", SUCCESS), ("physics_error", PHYSICS_ERROR)):
-            info[name] = task.flags[row] & rows
-            info[f"_{name}"] = rows.copy()
-        return info
+        terms = task.rewards[1:] * rows
+        flags = task.flags & rows
+        info: dict[str, Any] = dict(zip(self._names, terms, strict=True))
+        info["is_success"] = flags[SUCCESS]
+        info["physics_error"] = flags[PHYSICS_ERROR]
+        present = np.repeat(rows[None], len(info), axis=0)
+        return info | {f"_{name}": row for name, row in zip(info, present, strict=True)}
 
     def snapshot(self) -> tuple[Any, ...]:
         """Copy of the whole state, random streams included, for ``restore``."""

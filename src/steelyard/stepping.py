@@ -68,22 +68,19 @@ def _load_rows(s, source, width, count, targets, by_name, picked, whole):
 
 
 @inner
-def _store_world(tape, s, state, width, k, world):
-    """Copy one lane's state back."""
-    for row in range(tape[H_STATE_ROWS]):
-        state[width * row + world] = s[row, k]
-
-
-@inner
 def _store_block(tape, s, state, width, picked, count, whole):
-    """Copy the state of the picked worlds back."""
+    """Copy the state of the picked worlds back, but of those that are given up."""
+    given_up = load(s, tape[H_GIVEN_UP]) > splat(0.5)
     if whole:
         first = picked[0]
         for row in range(tape[H_STATE_ROWS]):
-            store_at(state, width * row + first, load(s, row))
+            entry = width * row + first
+            store_at(state, entry, select(given_up, load_at(state, entry), load(s, row)))
     else:
         for k in range(count):
-            _store_world(tape, s, state, width, k, picked[k])
+            if s[tape[H_GIVEN_UP], k] < 0.5:
+                for row in range(tape[H_STATE_ROWS]):
+                    state[width * row + picked[k]] = s[row, k]
 
 
 @inner
@@ -156,16 +153,12 @@ def _advance_blocks(launch, first, last, substeps, phase):
             skip[words + FRESH] = 1 if substep == 0 else 0
             _step(tape, s, skip, phase)
         _flag_nonfinite(tape, s)
-        if hasty and any_lane(load(s, tape[H_GIVEN_UP]) > splat(0.5)):
+        _store_block(tape, s, state, width, picked, count, whole)
+        if any_lane(load(s, tape[H_GIVEN_UP]) > splat(0.5)):
             for k in range(count):
-                world = picked[k]
                 if s[tape[H_GIVEN_UP], k] > 0.5:
-                    picked[LANES + waiting] = world
+                    picked[LANES + waiting] = picked[k]
                     waiting += 1
-                else:
-                    _store_world(tape, s, state, width, k, world)
-        else:
-            _store_block(tape, s, state, width, picked, count, whole)
 
 
 _ARGUMENTS = (Integers, types.int64, types.int64, types.int64, types.int64)
@@ -206,6 +199,21 @@ def launch(
 def advance_blocks(launch, first, last, substeps, phase):
     """Advance the worlds of blocks ``first`` ... ``last - 1``; ``phase`` is WHOLE_STEP or bits of its parts."""
     _call_advance(launch[L_ADVANCE], integers_at(launch.ctypes.data), first, last, substeps, phase)
+
+
+@kernel
+def start_again(mask, start, state):
+    """Put the state of the worlds of a mask back to the start.
+
+    Args:
+        mask: (worlds,) bool.
+        start: (state rows,) float64.
+        state: (state rows, padded worlds) float64, changed in place.
+    """
+    for world in range(len(mask)):
+        if mask[world]:
+            for row in range(len(start)):
+                state[row, world] = start[row]
 
 
 @inner

@@ -31,7 +31,7 @@ from .state import (
     new_scratch,
     new_state,
 )
-from .stepping import WHOLE_STEP, advance_blocks, launch
+from .stepping import WHOLE_STEP, advance_blocks, launch, start_again
 from .written import evaluate_forces, generate_contacts
 
 
@@ -315,10 +315,12 @@ class World:
         Raises:
             ValueError: the mask has another shape or type.
         """
-        chosen: Any = slice(0, self.worlds)
-        if mask is not None:
-            chosen = np.flatnonzero(checks.mask("World.reset", mask, worlds=self.worlds))
-        self._state[:, chosen] = self.model.start[:, None]
+        if mask is None:
+            self._state[:, : self.worlds] = self.model.start[:, None]
+        else:
+            start_again(
+                checks.mask("World.reset", mask, worlds=self.worlds), self.model.start, self._state
+            )
 
     @property
     def bytes_per_world(self) -> int:

@@ -34,7 +34,7 @@ from .cone_rows import relative_motion
 _SWEEPS = 200
 _ANCHORS = 3
 # Share of the allowed error that softness may leave.
-_PULL = 1e-3
+_PULL = 1e-2
 
 
 @inner

@@ -41,19 +41,53 @@ def relative_motion(tape, s, skip, k, source):
 
 
 @inner
-def add_motion_row(tape, s, skip, k, axis, row, factor, first):
-    """row += factor times row ``axis`` of (W)_c; columns are slots less ``first``."""
+def _put_rows(s, at, width, n, a, b, c, x, y, z, u, v, w):
+    """A 3 x 3 block of the system, (a b c), (x y z), (u v w) times the factors ``n``."""
+    normal, f00, f01, f11 = n
+    store(s, at, normal * a)
+    store(s, at + 1, normal * b)
+    store(s, at + 2, normal * c)
+    at += width
+    store(s, at, fma(f01, u, f00 * x))
+    store(s, at + 1, fma(f01, v, f00 * y))
+    store(s, at + 2, fma(f01, w, f00 * z))
+    at += width
+    store(s, at, fma(f11, u, f01 * x))
+    store(s, at + 1, fma(f11, v, f01 * y))
+    store(s, at + 2, fma(f11, w, f01 * z))
+
+
+@inner
+def put_motion_rows(tape, s, skip, k, row, width, factors, first):
+    """Rows of a contact's system: normal times row 0 of (W)_c, and a symmetric 2 x 2 matrix times rows 1 and 2.
+
+    Args:
+        k: product record of the contact, see ``relative_motion``.
+        row: first entry of its three rows, ``width`` apart; columns are slots less ``first``.
+        factors: normal, then entries 00, 01 and 11 of the matrix.
+    """
     w = tape[k + 1]
-    own = row + tape[k] - first
-    for column in range(3):
-        high = max(axis, column)
-        entry = high * (high + 1) // 2 + min(axis, column)
-        store(s, own + column, fma(factor, load(s, w + entry), load(s, own + column)))
+    a = load(s, w)
+    b = load(s, w + 1)
+    c = load(s, w + 3)
+    y = load(s, w + 2)
+    z = load(s, w + 4)
+    _put_rows(s, row + tape[k] - first, width, factors, a, b, c, b, y, z, c, z, load(s, w + 5))
     for other in range(tape[k + 4]):
         o = k + 5 + 4 * other
         if skip[tape[o + 3]] == 0:
             at = row + tape[o + 1] - first
-            for column in range(3):
-                entry = 3 * axis + column if tape[o + 2] == 0 else 3 * column + axis
-                value = load(s, tape[o] + entry)
-                store(s, at + column, fma(factor, value, load(s, at + column)))
+            m = tape[o]
+            a = load(s, m)
+            b = load(s, m + 1)
+            c = load(s, m + 2)
+            x = load(s, m + 3)
+            y = load(s, m + 4)
+            z = load(s, m + 5)
+            u = load(s, m + 6)
+            v = load(s, m + 7)
+            last = load(s, m + 8)
+            if tape[o + 2] == 0:
+                _put_rows(s, at, width, factors, a, b, c, x, y, z, u, v, last)
+            else:
+                _put_rows(s, at, width, factors, a, x, u, b, y, v, c, z, last)
