@@ -28,12 +28,12 @@ def fine_step(problem: Problem) -> float:
     return problem.stretch / problem.steps[-1]
 
 
-def motion(problem: Problem, scene: sy.Scene, entry: methods.Entry) -> Motion:
+def motion(problem: Problem, scene: sy.Scene, entry: sy.Candidate) -> Motion:
     """What an entry makes of a scene."""
     return EngineRun(problem, scene, entry.at(fine_step(problem))).motion()
 
 
-def best(problem: Problem) -> tuple[sy.Scene, methods.Entry]:
+def best(problem: Problem) -> tuple[sy.Scene, sy.Candidate]:
     """The form and the entry that a problem names."""
     for form, build in problem.forms.items():
         if problem.best.startswith(f"{form}, "):

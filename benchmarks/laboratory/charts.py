@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, NullFormatter
 
-from benchmarks.laboratory import methods
+import steelyard as sy
 from benchmarks.laboratory.measurement import Point, curves, order
 from benchmarks.laboratory.problem import Problem
 
@@ -113,7 +113,7 @@ Style = tuple[str, str, str, bool]
 
 def _styles(measured: Measured) -> dict[str, Style]:
     """Colour, mark, line and whether it is ours, by name; a method looks the same in every chart."""
-    listed = [entry.name for entry in methods.METHODS]
+    listed = [entry.name for entry in sy.CANDIDATES]
     found: dict[str, Style] = {}
     peers = 0
     forms = 0

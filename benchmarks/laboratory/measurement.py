@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+import steelyard as sy
 from benchmarks import record
 from benchmarks.laboratory import methods
 from benchmarks.laboratory.engines import BrokenRunError, EngineRun, PeerRun, Run
@@ -102,7 +103,7 @@ def measure(problem: Problem, *, quick: bool = False) -> list[Point]:
                 dt = problem.stretch / steps
 
                 def ours(
-                    dt: float = dt, entry: methods.Entry = entry, build: Any = scene, **kwargs: int
+                    dt: float = dt, entry: sy.Candidate = entry, build: Any = scene, **kwargs: int
                 ) -> Run:
                     return EngineRun(problem, build(), entry.at(dt), **kwargs)
 

@@ -1,6 +1,7 @@
 """Steelyard: a batched physics engine that lets you weigh speed against accuracy."""
 
 from . import draw, scenes
+from .choice import CANDIDATES, Candidate, Choice, Considered, candidates, choose_method
 from .integrators.backward_euler import BackwardEuler
 from .integrators.closed_form import ClosedForm, flight, flight_fall_time, flight_impact
 from .integrators.explicit_euler import ExplicitEuler
@@ -37,6 +38,7 @@ from .stepping import advance
 from .world import World
 
 __all__ = [
+    "CANDIDATES",
     "AnchoredBungee",
     "AnchoredSpring",
     "BackwardEuler",
@@ -44,7 +46,10 @@ __all__ = [
     "Buoyancy",
     "Cable",
     "CableConstraint",
+    "Candidate",
+    "Choice",
     "ClosedForm",
+    "Considered",
     "ContactGenerator",
     "Direct",
     "Drag",
@@ -71,6 +76,8 @@ __all__ = [
     "World",
     "WorstFirst",
     "advance",
+    "candidates",
+    "choose_method",
     "draw",
     "flight",
     "flight_fall_time",

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from .choice import Choice, choose_method
 from .diagnostics.energy import world_energy
 from .diagnostics.health import health_flags
 from .diagnostics.residual import link_residuals
@@ -42,26 +43,47 @@ class World:
         scene: what the worlds hold; copied, so later changes to it do not reach this world.
         worlds: number of copies, at least 1.
         method: how to step; velocity Verlet with the direct solver at 60 Hz by default.
+        tolerance: instead of a method: the cheapest that holds this error, see ``choose_method``.
+        horizon: over which time [s] it must hold.
         threads: worlds are shared among so many threads; results do not depend on it.
 
     Raises:
         TypeError: no scene or no method.
-        ValueError: the method cannot do what the scene holds, or a count is out of range.
+        ValueError: the method cannot do what the scene holds, nothing holds the tolerance, or a count is
+            out of range.
         MemoryError: the batch does not fit into memory.
     """
 
     # Slots, so that a misspelt assignment is an error and not a new attribute.
     __slots__ = (
-        "_given", "_given_rows", "_launch", "_method", "_model", "_scene", "_scratch", "_split", "_stale",
+        "_choice", "_given", "_given_rows", "_launch", "_method", "_model", "_scene", "_scratch", "_split", "_stale",
         "_state", "_threads", "_worlds",
     )  # fmt: skip
     _model: Model
     _state: np.ndarray
 
     def __init__(
-        self, scene: Scene, *, worlds: int = 1, method: Method = DEFAULT, threads: int = 1
+        self,
+        scene: Scene,
+        *,
+        worlds: int = 1,
+        method: Method | None = None,
+        tolerance: float | None = None,
+        horizon: float = 1.0,
+        threads: int = 1,
     ) -> None:
         checks.instance("World", "scene", scene, Scene, remedy="Build one.")
+        self._choice = None
+        if tolerance is not None:
+            if method is not None:
+                raise ValueError(
+                    f"World: both a method and a tolerance of {tolerance!r} are given; one follows from the "
+                    "other. Give one of them."
+                )
+            self._choice = choose_method(scene, tolerance=tolerance, horizon=horizon)
+            method = self._choice.method
+        elif method is None:
+            method = DEFAULT
         checks.instance("World", "method", method, Method, remedy="Use Method(Rattle(), Direct()).")
         self._worlds = checks.whole("World", "worlds", worlds, least=1, remedy="Use one.")
         self._threads = checks.whole("World", "threads", threads, least=1, remedy="Use one.")
@@ -83,6 +105,11 @@ class World:
     def method(self) -> Method:
         """How they step."""
         return self._method
+
+    @property
+    def choice(self) -> Choice | None:
+        """Why this method, where a tolerance was given; None where a method was."""
+        return self._choice
 
     @property
     def threads(self) -> int:
@@ -330,7 +357,7 @@ class World:
         return 8 * (self.model.state_rows + len(self._given_rows))
 
     def __getstate__(self) -> dict[str, Any]:
-        names = ("_scene", "_worlds", "_threads", "_method", "_state")
+        names = ("_scene", "_worlds", "_threads", "_method", "_choice", "_state")
         values = list(self.model.parameters.values.values())
         return {name: getattr(self, name) for name in names} | {"values": values}
 
@@ -403,6 +430,11 @@ class World:
             f"  {self.bytes_per_world} bytes per world, "
             f"{self.model.rows * LANES * 8} bytes of scratch per thread",
         ]
+        if self._choice is not None:
+            lines.append(
+                f"  chosen for {self._choice.tolerance:g} over {self._choice.horizon:g} s: error "
+                f"{self._choice.error:.2g}, {self._choice.cost:.3g} us per simulated second and world expected"
+            )
         if self.model.dropped:
             lines.append(
                 f"  {len(self.model.dropped)} rods implied by others or by a rigid cluster have no row"

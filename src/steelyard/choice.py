@@ -1,0 +1,370 @@
+"""The method that a scene needs: the cheapest that holds a tolerance, tried on the scene itself.
+
+What a step costs comes from a table that the laboratory measured (``costs.json``: a linear fit over the particles and
+the words on the index tape, which kernels work through). What a step errs by is measured on the scene: a run is
+compared with a reference, which is the run of the method of highest order that halving the step no longer changes.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from functools import cache
+from importlib.resources import files
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .integrators.backward_euler import BackwardEuler
+from .integrators.base import Integrator
+from .integrators.closed_form import ClosedForm
+from .integrators.explicit_euler import ExplicitEuler
+from .integrators.exponential import ExponentialRungeKutta
+from .integrators.implicit_midpoint import ImplicitMidpoint
+from .integrators.linearly_implicit import LinearlyImplicit
+from .integrators.rattle import Rattle
+from .integrators.rk4 import RungeKutta4
+from .integrators.symplectic_euler import SymplecticEuler
+from .methods import Method
+from .model.tape import HEADER
+from .scene import checks
+from .scene.contacts import ContactGenerator, Ground, LinePlatform
+from .scene.links import Cable, CableConstraint, Rod, RodConstraint
+from .scene.rider import Rider
+from .scene.scene import Scene
+from .solvers.base import Solver
+from .solvers.direct import Direct
+from .solvers.gauss_seidel import GaussSeidel
+from .solvers.worst_first import WorstFirst
+
+if TYPE_CHECKING:
+    from .world import World
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A method at any step.
+
+    Attributes:
+        name: what charts and tables call it.
+        integrator: how it advances.
+        solver: what holds links and contacts; None for scenes without any.
+    """
+
+    name: str
+    integrator: Integrator
+    solver: Solver | None = None
+
+    def at(self, dt: float) -> Method:
+        """The method with a step [s]."""
+        return Method(self.integrator, self.solver, dt=dt)
+
+
+#: What is measured, charted and chosen from.
+CANDIDATES = (
+    Candidate("explicit Euler", ExplicitEuler()),
+    Candidate("symplectic Euler", SymplecticEuler()),
+    Candidate("velocity Verlet", Rattle()),
+    Candidate("RK4", RungeKutta4()),
+    Candidate("exponential", ExponentialRungeKutta()),
+    Candidate("linearly implicit", LinearlyImplicit()),
+    Candidate("backward Euler", BackwardEuler()),
+    Candidate("implicit midpoint", ImplicitMidpoint()),
+    Candidate("closed form", ClosedForm()),
+    Candidate("RATTLE, direct", Rattle(), Direct()),
+    Candidate("RATTLE, Gauss-Seidel x 4", Rattle(), GaussSeidel(passes=4)),
+    Candidate("RATTLE, Gauss-Seidel x 16", Rattle(), GaussSeidel(passes=16)),
+    Candidate("RATTLE, Gauss-Seidel x 64", Rattle(), GaussSeidel(passes=64)),
+    Candidate("symplectic Euler, direct", SymplecticEuler(), Direct()),
+    Candidate("explicit Euler, worst first", ExplicitEuler(), WorstFirst()),
+)
+
+#: Times at which runs are compared.
+_LOOKS = 20
+#: Most steps of a run; what needs more is out of reach.
+_MOST = 400_000
+#: Share of the tolerance that the reference may err by, and that is aimed at and accepted of the rest.
+_REFERENCE, _AIM, _ACCEPT = 0.05, 0.8, 0.95
+_TRIES = 8
+
+
+@cache
+def cost_table() -> dict[str, list[float]]:
+    """Cost per step and world [us] by method: a constant, per particle, per word on the tape."""
+    text = files("steelyard").joinpath("costs.json").read_text()
+    table: dict[str, list[float]] = json.loads(text)["coefficients"]
+    return table
+
+
+@dataclass(frozen=True)
+class Considered:
+    """What was found about one candidate.
+
+    Attributes:
+        name: of the method.
+        dt: largest step found to hold the tolerance [s]; None where none was found.
+        error: measured on the scene at that step, inf where none was found.
+        cost: expected [us per simulated second and world], inf where no step was found.
+        verdict: in words.
+    """
+
+    name: str
+    dt: float | None
+    error: float
+    cost: float
+    verdict: str
+
+
+@dataclass(frozen=True)
+class Choice:
+    """The chosen method and why it won; ``print`` shows all that was considered.
+
+    Attributes:
+        method: the cheapest that holds the tolerance.
+        tolerance: what was asked for.
+        horizon: over which time [s].
+        error: measured on the scene.
+        cost: expected [us per simulated second and world].
+        considered: all candidates that can step the scene, the cheapest first.
+    """
+
+    method: Method
+    tolerance: float
+    horizon: float
+    error: float
+    cost: float
+    considered: tuple[Considered, ...] = field(repr=False)
+
+    def __str__(self) -> str:
+        lines = [
+            f"{self.considered[0].name} at {1.0 / self.method.dt:.6g} Hz holds {self.tolerance:g} over "
+            f"{self.horizon:g} s: error {self.error:.2g}, {self.cost:.3g} us per simulated second and world",
+            f"  {'method':<28} {'rate [Hz]':>11} {'error':>9} {'cost [us]':>11}  verdict",
+        ]
+        for entry in self.considered:
+            rate = f"{1.0 / entry.dt:.6g}" if entry.dt else "-"
+            error = f"{entry.error:.2g}" if entry.dt else "-"
+            cost = f"{entry.cost:.4g}" if entry.dt else "-"
+            lines.append(f"  {entry.name:<28} {rate:>11} {error:>9} {cost:>11}  {entry.verdict}")
+        return "\n".join(lines)
+
+
+@dataclass(frozen=True)
+class _Track:
+    """One run, look by look: positions (looks, particles, 3), energies (looks,), worst residual, kinetic energy."""
+
+    position: np.ndarray
+    energy: np.ndarray
+    residual: float
+    kinetic: float
+
+    def distance(self, other: _Track) -> float:
+        """Largest error: of a place [m], of the energy as a share of what moves, of a link as a share of it."""
+        scale = max(float(np.ptp(other.energy)), other.kinetic)
+        energy = float(np.abs(self.energy - other.energy).max())
+        place = float(np.linalg.norm(self.position - other.position, axis=2).max())
+        return max(place, energy / scale if scale > 0.0 else 0.0, self.residual)
+
+
+class _Runs:
+    """Runs of one candidate over the horizon, by steps per look."""
+
+    def __init__(self, candidate: Candidate, scene: Scene, horizon: float) -> None:
+        from .world import World
+
+        self.candidate = candidate
+        self.order = max(candidate.integrator.order(), 1)
+        solver = candidate.solver
+        self.exact = solver is None or solver.sparse
+        self._scene = scene
+        self._horizon = horizon
+        self._world: type[World] = World
+        self._tracks: dict[int, _Track | None] = {}
+        model = self._build(1).model
+        constant, particle, word = cost_table()[candidate.name]
+        words = len(model.tape) - HEADER
+        self.step_cost = constant + particle * len(scene.particles) + word * words
+
+    def dt(self, steps: int) -> float:
+        """Step [s]."""
+        return self._horizon / (_LOOKS * steps)
+
+    def cost(self, steps: int) -> float:
+        """Expected cost [us per simulated second and world]."""
+        return self.step_cost / self.dt(steps)
+
+    def _build(self, steps: int) -> World:
+        return self._world(self._scene, method=self.candidate.at(self.dt(steps)))
+
+    def track(self, steps: int) -> _Track | None:
+        """The run, or None where it broke or is too long."""
+        if steps * _LOOKS > _MOST:
+            return None
+        if steps not in self._tracks:
+            self._tracks[steps] = self._run(steps)
+        return self._tracks[steps]
+
+    def _run(self, steps: int) -> _Track | None:
+        world = self._build(steps)
+        position, energy = [], []
+        residual = kinetic = 0.0
+        for _ in range(_LOOKS):
+            world.step(steps)
+            if world.health[0]:
+                return None
+            position.append(world.particles.position[0].copy())
+            energy.append(float(world.energy[0]))
+            links = world.residual[0]
+            residual = max(residual, float(np.abs(links).max()) if links.size else 0.0)
+            speed = world.particles.velocity[0]
+            kinetic = max(kinetic, 0.5 * float(world.particles.mass_or_zero[0] @ (speed**2).sum(1)))
+        return _Track(np.stack(position), np.array(energy), residual, kinetic)
+
+
+def candidates(scene: Scene) -> Iterator[Candidate]:
+    """The candidates that can step a scene; with a solver only where one is needed."""
+    held = bool(
+        scene.of(
+            Rod,
+            RodConstraint,
+            Cable,
+            CableConstraint,
+            Rider,
+            Ground,
+            LinePlatform,
+            ContactGenerator,
+        )
+    )
+    for candidate in CANDIDATES:
+        if held == (candidate.solver is not None):
+            try:
+                candidate.at(1.0).refuse(scene)
+            except ValueError:
+                continue
+            yield candidate
+
+
+def _reference(runs: list[_Runs], start: int, tolerance: float) -> tuple[_Track | None, float]:
+    """The run that is known best, and its error by halving the step.
+
+    Sweeps may leave an error that no step takes away, so their runs are no reference where others are.
+    """
+    trusted = [run for run in runs if run.exact] or runs
+    best: tuple[_Track | None, float] = (None, math.inf)
+    for run in sorted(trusted, key=lambda run: -run.order):
+        steps, change = start, math.inf
+        before = run.track(steps)
+        while (finer := run.track(2 * steps)) is not None or 2 * steps * _LOOKS <= _MOST:
+            steps *= 2
+            if finer is not None and before is not None:
+                last, change = change, finer.distance(before)
+                # By what factor halving reduces the change; first order until it is seen.
+                falls = min(max(last / change, 1.2), 2.0**run.order) if change > 0.0 else 2.0
+                error = change / ((falls if last < math.inf else 2.0) - 1.0)
+                if error < best[1]:
+                    best = finer, error
+                if error <= _REFERENCE * tolerance:
+                    return best
+                if change > 0.9 * last:
+                    break
+            before = finer
+    return best
+
+
+def _smallest(
+    run: _Runs, reference: _Track, known: float, start: int, tolerance: float, limit: float
+) -> tuple[int | None, float, float]:
+    """Fewest steps per look that hold the tolerance, at less than the cost ``limit``.
+
+    Returns:
+        The steps or None, the error there, and the least error seen.
+    """
+    tried: dict[int, float] = {}
+    low, high, steps = 0, 0, start
+    for _ in range(_TRIES):
+        if run.cost(steps) > limit and not high:
+            steps = max(low + 1, int(steps * 0.98 * limit / run.cost(steps)))
+            if steps in tried or run.cost(steps) > limit:
+                break
+        track = run.track(steps)
+        error = math.inf if track is None else track.distance(reference) + known
+        tried[steps] = error
+        if error <= _ACCEPT * tolerance:
+            high = min(high or steps, steps)
+        else:
+            low = max(low, steps)
+        finite = sorted((k, e) for k, e in tried.items() if known < e < math.inf)
+        order = float(run.order)
+        if len(finite) > 1:
+            (k0, e0), (k1, e1) = finite[-2:]
+            order = min(max(math.log(e0 / e1) / math.log(k1 / k0), 0.5), order)
+        factor = 4.0 if error == math.inf else (error / (_AIM * tolerance)) ** (1.0 / order)
+        wanted = math.ceil(factor * steps)
+        if high:
+            wanted = min(max(wanted, low + 1), high)
+            if wanted > 0.95 * high:
+                break
+        else:
+            wanted = min(max(wanted, low + 1), 64 * steps)
+        if wanted * _LOOKS > _MOST:
+            break
+        steps = wanted
+    least = min(tried.values(), default=math.inf)
+    return (high, tried[high], least) if high else (None, math.inf, least)
+
+
+def choose_method(scene: Scene, *, tolerance: float, horizon: float = 1.0) -> Choice:
+    """The cheapest method measured to hold a tolerance on a scene.
+
+    Every method that can step the scene is run on it, from the scene's start over the horizon, at the steps that
+    its order suggests; that takes seconds, and more where code must be compiled.
+
+    Args:
+        scene: what is to be stepped.
+        tolerance: largest error [m] of a particle's place, and largest share of error of the energy (beside
+            the kinetic energy or the range of the energy, whichever is larger) and of a link's length.
+        horizon: how long the tolerance must hold [s].
+
+    Returns:
+        The choice, with all that was considered.
+
+    Raises:
+        TypeError: no scene.
+        ValueError: no method reaches the tolerance; the message names the best that can be had.
+    """
+    owner = "choose_method"
+    checks.instance(owner, "scene", scene, Scene, remedy="Build one.")
+    allowed = checks.number(owner, "tolerance", tolerance, above=0.0, remedy="Use 1e-4.")
+    span = checks.number(owner, "horizon", horizon, above=0.0, remedy="Use 1 s.")
+    scene.check()
+    start = max(1, math.ceil(60.0 * span / _LOOKS))
+    runs = [_Runs(candidate, scene, span) for candidate in candidates(scene)]
+    reference, known = _reference(runs, start, allowed)
+    found: list[Considered] = []
+    best, limit = known, math.inf
+    if reference is not None and known <= 0.5 * allowed:
+        for run in sorted(runs, key=lambda run: (-run.order, run.step_cost)):
+            name = run.candidate.name
+            steps, error, least = _smallest(run, reference, known, start, allowed, limit)
+            best = min(best, least)
+            if steps is None:
+                verdict = (
+                    f"dearer than the best; {least:.2g} was seen"
+                    if run.cost(_MOST // _LOOKS) > limit
+                    else f"does not hold it; {least:.2g} was seen"
+                )
+                found.append(Considered(name, None, math.inf, math.inf, verdict))
+            else:
+                found.append(Considered(name, run.dt(steps), error, run.cost(steps), "holds it"))
+                limit = min(limit, run.cost(steps))
+    found.sort(key=lambda entry: entry.cost)
+    if not found or found[0].dt is None:
+        raise ValueError(
+            f"choose_method: a tolerance of {allowed:g} over {span:g} s is out of reach of every method "
+            f"within {_MOST} steps; the best that can be had is {best:.2g}. Ask for that, or for a shorter horizon."
+        )
+    won = found[0]
+    method = next(run for run in runs if run.candidate.name == won.name).candidate.at(won.dt or 0.0)
+    return Choice(method, allowed, span, won.error, won.cost, tuple(found))
