@@ -3,6 +3,7 @@
 from . import draw, scenes
 from .integrators.backward_euler import BackwardEuler
 from .integrators.closed_form import ClosedForm, flight, flight_fall_time, flight_impact
+from .integrators.composed_rattle import ComposedRattle
 from .integrators.explicit_euler import ExplicitEuler
 from .integrators.exponential import ExponentialRungeKutta
 from .integrators.implicit_midpoint import ImplicitMidpoint
@@ -45,6 +46,7 @@ __all__ = [
     "Cable",
     "CableConstraint",
     "ClosedForm",
+    "ComposedRattle",
     "ContactGenerator",
     "Direct",
     "Drag",

@@ -11,7 +11,7 @@ from .integrators.rattle import Rattle
 from .integrators.rk4 import RungeKutta4
 from .integrators.symplectic_euler import SymplecticEuler
 from .scene import checks
-from .scene.forces import StiffSpring, UserForce
+from .scene.forces import Drag, StiffSpring, UserForce
 from .scene.links import Cable, CableConstraint
 from .scene.rider import Rider
 from .scene.scene import CONTACTS, FORCES, LINKS, Scene
@@ -99,6 +99,8 @@ class Method:
                 "WorstFirst cannot hold a Rider: it has no impulse for it. Use Direct(), or spread "
                 "the load's mass over the deck (steelyard.scenes.lumped_masses)."
             )
+        if self.integrator.reverses:
+            self._refuse_backwards(name, scene)
         sprung = {id(spring.particle) for spring in scene.of(StiffSpring)}
         for thing in held:
             if any(id(p) in sprung for p in scene.touched(thing)):
@@ -112,6 +114,15 @@ class Method:
         ):
             raise ValueError(
                 "ExplicitEuler cannot drive a winch. Use SymplecticEuler() or Rattle()."
+            )
+
+    @staticmethod
+    def _refuse_backwards(name: str, scene: Scene) -> None:
+        """Raise if a scene holds what cannot run backwards in time."""
+        for thing in scene.of(Cable, CableConstraint, *CONTACTS, Drag, StiffSpring):
+            raise ValueError(
+                f"{name} cannot step a {type(thing).__name__}: parts of its step run backwards in time, where "
+                "impacts and drag have no meaning. Use Rattle(), or rods and AnchoredSpring."
             )
 
     @staticmethod

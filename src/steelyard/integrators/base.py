@@ -36,6 +36,14 @@ class Integrator:
     #: Whether it works with a solver of displacements and velocities (True), of impulses (False).
     solver_stages: ClassVar[tuple[bool, ...]] = ()
 
+    #: Whether part of its step runs backwards in time.
+    reverses: ClassVar[bool] = False
+
+    @property
+    def fractions(self) -> tuple[float, ...]:
+        """Length of each substep over that of the step."""
+        return (1.0,)
+
     def recipe(self, solver: Solver | None) -> Recipe:
         """Stages of a step in order, each with its part: of most methods 0, or 1 for what follows the new positions.
 

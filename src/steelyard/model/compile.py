@@ -273,6 +273,8 @@ class Compiler:
             self.header["damping"] = self.slot(3 * count, (damping_key,), phis)
         elif method.integrator.smooth:
             self.header["damping"] = self.slot(count, (damping_key,), derived.rate)
+        elif len(method.integrator.fractions) > 1:
+            self.header["damping"] = self.take(count)
         else:
             self.header["damping"] = self.slot(
                 count, (damping_key,), lambda value: derived.decay(value, share)
@@ -282,6 +284,31 @@ class Compiler:
         stiff = {id(spring.particle) for spring in flows}
         self.sections["drift"] = [p for p, x in enumerate(self.particles) if id(x) not in stiff]
         self.header["dt"] = self.constant(method.dt)
+        self._substeps()
+
+    def _substeps(self) -> None:
+        """Lengths, what damping keeps and how impulses grow, of each part of a step that is made of several."""
+        fractions = self.method.integrator.fractions
+        if len(fractions) == 1:
+            return
+        share = self.method.integrator.damping_share * self.method.dt
+        kept = {
+            part: self.slot(
+                len(self.particles),
+                ((PARTICLES, "damping"),),
+                lambda value, part=part: derived.decay(value, part * share),
+            )
+            for part in set(fractions)
+        }
+        records: list[int] = []
+        for part, before in zip(fractions, (fractions[-1], *fractions), strict=False):
+            records += [
+                self.constant(part * self.method.dt),
+                kept[part],
+                self.constant((part / before) ** 2),
+            ]
+        self.sections["substeps"] = [*records, self.constant(self.method.dt)]
+        self.counts["substeps"] = len(fractions)
 
     def some(self, chosen: Any) -> list[Particle]:
         """The chosen particles, or all."""

@@ -89,8 +89,9 @@ from __future__ import annotations
     H_DRAG_BLOCKS,
     H_FLOAT_BLOCKS,
     H_PROPAGATORS,
-) = range(80)
-HEADER = 80
+    H_SUBSTEPS,
+) = range(81)
+HEADER = 81
 
 # Width of the records of links and contacts; ``model.compile`` writes them field by field.
 LINK = 17
