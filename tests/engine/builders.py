@@ -25,6 +25,11 @@ RESOLVED = {
     "ExplicitEuler-WorstFirst": (sy.ExplicitEuler(), sy.WorstFirst()),
 }
 METHODS = STAGED | RESOLVED
+# What cannot hold cables and contacts.
+COMPOSED = {
+    "ComposedRattle-Direct": (sy.ComposedRattle(), sy.Direct()),
+    "ComposedRattle-GaussSeidel": (sy.ComposedRattle(), sy.GaussSeidel(passes=60)),
+}
 # What steps particles under forces alone.
 SMOOTH = {
     "RungeKutta4": (sy.RungeKutta4(), None),
@@ -41,7 +46,7 @@ _RESIDUAL = {"Direct": 1e-12, "GaussSeidel": 1e-4, "WorstFirst": 0.1}
 
 def method(name: str, *, dt: float) -> sy.Method:
     """A method of the tables above."""
-    integrator, solver = (METHODS | SMOOTH)[name]
+    integrator, solver = (METHODS | COMPOSED | SMOOTH)[name]
     return sy.Method(integrator, solver, dt=dt)
 
 

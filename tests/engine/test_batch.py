@@ -15,7 +15,7 @@ import pytest
 
 import steelyard as sy
 from benchmarks.scenes import bridge, tumbling_platform
-from tests.engine.builders import METHODS, SMOOTH, Array, from_particle_scene, method
+from tests.engine.builders import COMPOSED, METHODS, SMOOTH, Array, from_particle_scene, method
 
 DT = 1 / 60
 STEPS = 60
@@ -58,6 +58,22 @@ def net() -> sy.Scene:
         scene.add(sy.Cable(row[k - 1], p, 0.55, restitution=0.5))
         if k % 2:
             scene.add(sy.CableConstraint(p, (0.5 * k, 3.0, 0.2), 1.3, restitution=0.8))
+    return scene
+
+
+def swing() -> sy.Scene:
+    """A rigid cluster with a load on its deck, from which rods hang, on a spring."""
+    scene = from_particle_scene(replace(tumbling_platform(), gravity=(0.0, -9.81, 0.0)))
+    deck = scene.particles[2:6]
+    place = np.mean([p.position for p in deck], axis=0)
+    scene.add(sy.Rider(scene.add(sy.Particle(position=place, mass=10.0)), deck))
+    scene.add(sy.AnchoredSpring(deck[0], (0.0, 6.0, 0.0), 200.0, 2.0))
+    last = scene.particles[0]
+    for _ in range(3):
+        below = np.add(last.position, (0.0, -0.5, 0.1))
+        p = scene.add(sy.Particle(position=below, mass=1.0))
+        scene.add(sy.Rod(last, p))
+        last = p
     return scene
 
 
@@ -150,17 +166,20 @@ SCENES: dict[str, Callable[[], sy.Scene]] = {
     "cage": cage,
     "balls": balls,
     "springs": springs,
+    "swing": swing,
     "mesh": mesh,
     "blown mesh": blown_mesh,
 }
 FORCES_ALONE = ("mesh", "blown mesh")
+NO_IMPACTS = ("swing",)
 PAIRS = [
     (scene, name)
     for scene in SCENES
     for name in METHODS
-    if scene not in FORCES_ALONE
+    if scene not in (*FORCES_ALONE, *NO_IMPACTS)
     if not (scene == "ridden platform" and name.endswith("WorstFirst"))
 ]
+PAIRS += [(scene, name) for scene in NO_IMPACTS for name in COMPOSED]
 PAIRS += [
     (scene, name)
     for scene in FORCES_ALONE

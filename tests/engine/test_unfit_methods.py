@@ -75,6 +75,8 @@ UNFIT = [
     (sy.ExplicitEuler(), sy.GaussSeidel()),
     (sy.SymplecticEuler(), None),
     (sy.Rattle(), None),
+    (sy.ComposedRattle(), None),
+    (sy.ComposedRattle(), sy.WorstFirst()),
     (sy.Rattle(), sy.WorstFirst()),
     (sy.ClosedForm(), None),
     (sy.ClosedForm(), sy.Direct()),
@@ -89,6 +91,8 @@ FIT = [
     (sy.SymplecticEuler(), sy.GaussSeidel()),
     (sy.Rattle(), sy.Direct()),
     (sy.Rattle(), sy.GaussSeidel()),
+    (sy.ComposedRattle(), sy.Direct()),
+    (sy.ComposedRattle(), sy.GaussSeidel()),
 ]
 
 
@@ -98,7 +102,7 @@ def _names(method: Any) -> str:
 
 def test_every_combination_is_either_fit_or_unfit() -> None:
     integrators = [sy.ExplicitEuler, sy.SymplecticEuler, sy.Rattle, sy.ClosedForm]
-    integrators += map(type, SMOOTH)
+    integrators += [*map(type, SMOOTH), sy.ComposedRattle]
     solvers = [type(None), sy.WorstFirst, sy.Direct, sy.GaussSeidel]
     tried = [(type(i), type(s)) for i, s in UNFIT + FIT]
     assert sorted(map(str, tried)) == sorted(str((i, s)) for i in integrators for s in solvers)
@@ -128,6 +132,9 @@ def test_a_method_that_can_hold_it(method: Any, k: int) -> None:
     scene.add(thing)
     if isinstance(thing, sy.Rider) and isinstance(method[1], sy.WorstFirst):
         with refused("WorstFirst", "Rider", "Direct()", kind=ValueError):
+            sy.World(scene, method=sy.Method(*method))
+    elif method[0].reverses and isinstance(thing, (sy.Cable, sy.CableConstraint, *CONTACTS)):
+        with refused("ComposedRattle", type(thing).__name__, "backwards", kind=ValueError):
             sy.World(scene, method=sy.Method(*method))
     else:
         world = sy.World(scene, method=sy.Method(*method))

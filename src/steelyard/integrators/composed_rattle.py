@@ -11,10 +11,11 @@ time, where damping's exact flow amplifies by what the rest takes away again, so
 | 5 | 4 | Suzuki (1990) | 2.721 | 9.3e-4 (h w)^4 |
 | 9 | 6 | Kahan & Li (1997) | 2.532 | 4.1e-4 (h w)^6 |
 
-A substep costs what a step of RATTLE costs. Symplectic and time-reversible without damping; momenta and links are held
-as RATTLE holds them. The order stands while damping is slow beside the step and forces are smooth: across
-the kink of a bungee or of a float it drops. Refuses cables and contacts, since an impact cannot run backwards, and drag,
-stiff springs and user-written forces.
+A substep costs what a step of RATTLE costs. Symplectic and time-reversible without damping; momenta and links are
+held as RATTLE holds them. The order stands while damping is slow beside the step and forces are smooth: across the
+kink of a bungee or of a float it drops. What a solver leaves of the places is divided by the length of a substep: below
+some 1e-10 m errors rise again as steps get shorter, and sweeps that do not settle cost the order. Refuses cables and
+contacts, since an impact cannot run backwards, drag, stiff springs and user-written forces.
 
 Source: Hairer, Lubich & Wanner, *Geometric Numerical Integration*, II.4, V.3.2 and VII.1.4.
 """
