@@ -5,6 +5,7 @@ from .integrators.backward_euler import BackwardEuler
 from .integrators.closed_form import ClosedForm, flight, flight_fall_time, flight_impact
 from .integrators.explicit_euler import ExplicitEuler
 from .integrators.exponential import ExponentialRungeKutta
+from .integrators.generalised_alpha import GeneralisedAlpha
 from .integrators.implicit_midpoint import ImplicitMidpoint
 from .integrators.linearly_implicit import LinearlyImplicit
 from .integrators.rattle import Rattle
@@ -51,6 +52,7 @@ __all__ = [
     "ExplicitEuler",
     "ExponentialRungeKutta",
     "GaussSeidel",
+    "GeneralisedAlpha",
     "Gravity",
     "Ground",
     "ImplicitMidpoint",
