@@ -121,7 +121,7 @@ class Method:
         if self.solver is not None:
             raise ValueError(
                 f"{name} does not work with {type(self.solver).__name__}; it holds links itself. "
-                "Use Method(GeneralisedAlpha()) without a solver."
+                f"Use Method({name}()) without a solver."
             )
         for contact in scene.of(*CONTACTS):
             raise ValueError(

@@ -59,6 +59,7 @@ from ..model.tape import (
     H_VELOCITY,
     H_WORK,
 )
+from ..scene import checks
 from ..solvers.base import Solver
 from ..solvers.saddle import MASSES, MOTION
 from ..solvers.saddle_rows import (
@@ -78,6 +79,9 @@ from ..stage import call_stage, stage
 from .base import Integrator, Recipe
 from .implicit import UNKNOWN, load_force
 
+_SHARE = checks.Limit(
+    least=0.0, most=1.0, remedy="Use 0 where motion is violent, 0.5 where it is resolved."
+)
 # Constants, in rows of the scratch.
 _SQUARE, _RATE, _OLD, _NEW, _FORCES, _FILTERED, _OLD_SPEED, _NEW_SPEED, _INVERSE = range(9)
 _FREE_CHANGES = 10
@@ -103,7 +107,10 @@ class GeneralisedAlpha(Integrator):
     smooth: ClassVar[bool] = True
     evaluations: ClassVar[tuple[float | None, ...]] = ()
     holds_links: ClassVar[bool] = True
-    work: ClassVar[int] = 13
+    work: ClassVar[int] = 14
+
+    def __post_init__(self) -> None:
+        checks.number("GeneralisedAlpha", "rho_inf", self.rho_inf, _SHARE)
 
     @property
     def reach(self) -> float:  # type: ignore[override]
@@ -172,7 +179,11 @@ def _start_accelerations(tape, s, skip, fresh, dt):
 
 @stage
 def generalised_alpha_begin(tape, s, skip, part):
-    """Accelerations at the start, and what of the step's end does not depend on the forces there."""
+    """Accelerations at the start, and what of the step's end does not depend on the forces there.
+
+    Work rows: positions, velocities and filtered accelerations of that kind, then what the forces move, which is kept
+    apart since a difference of positions would lose it to rounding, then sizes of forces (``pull``).
+    """
     dt = load(s, tape[H_DT])
     work = tape[H_WORK]
     count = 3 * tape[H_PARTICLES]
@@ -188,9 +199,9 @@ def generalised_alpha_begin(tape, s, skip, part):
     add_drag(tape, s)
     if any_lane(fresh):
         _start_accelerations(tape, s, skip, fresh, dt)
-    jolt = keep_multipliers(tape, s)
+    jolt = keep_multipliers(tape, s, fresh, dt)
     store(s, tape[H_JOLT], select(jolt, splat(1.0), splat(0.0)))
-    pull(tape, s, work + 3 * count)
+    pull(tape, s, work + 4 * count)
     square = load(s, constants + _SQUARE)
     at = tape[H_UNKNOWNS]
     for index in range(tape[at]):
@@ -215,6 +226,7 @@ def generalised_alpha_begin(tape, s, skip, part):
             store(s, work + count + row, v)
             store(s, work + 2 * count + row, b)
             moved = square * q
+            store(s, work + 3 * count + row, moved)
             store(s, tape[H_POSITION] + row, x + moved)
             store(s, tape[H_VELOCITY] + row, fma(load(s, constants + _RATE), moved, v))
     at = tape[H_DRIFT]
@@ -253,7 +265,7 @@ def _motion_rows(tape, s):
             pulled = force[axis]
             x = load(s, tape[H_POSITION] + row)
             free = load(s, work + row)
-            moved = mass * (x - free)
+            moved = mass * load(s, work + 3 * count + row)
             size = size + absolute(moved) + square * absolute(pulled)
             rounding = rounding + mass * (absolute(x) + absolute(free))
             if tape[H_IMPULSE] >= 0:
@@ -262,7 +274,7 @@ def _motion_rows(tape, s):
             store(s, tape[k + 2] + axis, rest)
             left = left + absolute(rest)
         if tape[H_IMPULSE] >= 0:
-            size = fma(square, load(s, work + 3 * count + tape[k + 1]), size)
+            size = fma(square, load(s, work + 4 * count + tape[k + 1]), size)
         bad = bad | (left > fma(tolerance, size, splat(_ROUNDING) * rounding))
     return bad
 
@@ -285,7 +297,7 @@ def generalised_alpha_solve(tape, s, skip, part):
         accumulate_forces(tape, s)
         add_drag(tape, s)
         bad = position_rows(tape, s, active, turn >= _FREE_CHANGES)
-        pull(tape, s, work + 3 * count)
+        pull(tape, s, work + 4 * count)
         active = active & (_motion_rows(tape, s) | bad)
         if turn == tape[H_PASSES] or not any_lane(active):
             break
@@ -296,11 +308,11 @@ def generalised_alpha_solve(tape, s, skip, part):
             for axis in range(3):
                 row = tape[k] + axis
                 change = select(active, load(s, tape[k + 2] + axis), zero)
-                x = load(s, tape[H_POSITION] + row) + change
-                store(s, tape[H_POSITION] + row, x)
+                moved = load(s, work + 3 * count + row) + change
+                store(s, work + 3 * count + row, moved)
+                store(s, tape[H_POSITION] + row, load(s, work + row) + moved)
                 v = load(s, work + count + row)
-                v = fma(rate, x - load(s, work + row), v)
-                store(s, tape[H_VELOCITY] + row, v)
+                store(s, tape[H_VELOCITY] + row, fma(rate, moved, v))
     flag = tape[H_UNSETTLED]
     store(s, flag, select(active, splat(1.0), load(s, flag)))
 
@@ -356,7 +368,7 @@ def generalised_alpha_end(tape, s, skip, part):
         k = at + 1 + UNKNOWN * index
         for axis in range(3):
             row = tape[k] + axis
-            moved = load(s, tape[H_POSITION] + row) - load(s, work + row)
+            moved = load(s, work + 3 * count + row)
             v = fma(rate, moved, load(s, work + count + row))
             store(s, tape[H_VELOCITY] + row, v)
             a = fma(inverse, moved, load(s, work + 2 * count + row))

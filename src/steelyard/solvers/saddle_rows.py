@@ -79,8 +79,11 @@ def pull(tape, s, work):
 
 
 @inner
-def keep_multipliers(tape, s):
-    """Note the multipliers of the step's start; worlds in which a link is off its length."""
+def keep_multipliers(tape, s, fresh, dt):
+    """Note the multipliers of the step's start; worlds in which a link is off its length.
+
+    Of worlds that start afresh also those in which one is about to leave it: velocities were given that it cannot follow.
+    """
     zero = splat(0.0)
     one = splat(1.0)
     off = zero > zero
@@ -90,15 +93,22 @@ def keep_multipliers(tape, s):
         store(s, tape[link + 14] + 3, load(s, tape[link + 12]))
         length = load(s, tape[link + 8])
         error = link_half_square(s, link, tape, length)
-        over = error > _near(tape, s, length)
+        near = _near(tape, s, length)
+        over = error > near
+        short = error < zero - near
+        leaves = dt * (link_rate(s, link, tape) - length * load(s, tape[link + 9]))
         if tape[link + 10] == 0:
-            over = over | (error < zero - _near(tape, s, length))
+            over = over | short
+            leaves = absolute(leaves)
+        else:
+            leaves = select(short, zero, leaves)
         store(s, tape[link + 14] + 1, select(over, one, zero))
-        off = off | over
+        off = off | over | (fresh & (leaves > near))
     at = tape[H_RIDERS] + 1
     for _ in range(tape[tape[H_RIDERS]]):
         for axis in range(3):
             off = off | (absolute(rider_offset(s, tape, at, axis)) > splat(_NEAR))
+            off = off | (fresh & (absolute(dt * rider_slip(s, tape, at, axis)) > splat(_NEAR)))
         at += HEAD + DECK * tape[at + 6]
     return off
 
