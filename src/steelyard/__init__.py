@@ -6,6 +6,7 @@ from .integrators.closed_form import ClosedForm, flight, flight_fall_time, fligh
 from .integrators.composed_rattle import ComposedRattle
 from .integrators.explicit_euler import ExplicitEuler
 from .integrators.exponential import ExponentialRungeKutta
+from .integrators.generalised_alpha import GeneralisedAlpha
 from .integrators.implicit_midpoint import ImplicitMidpoint
 from .integrators.linearly_implicit import LinearlyImplicit
 from .integrators.rattle import Rattle
@@ -53,6 +54,7 @@ __all__ = [
     "ExplicitEuler",
     "ExponentialRungeKutta",
     "GaussSeidel",
+    "GeneralisedAlpha",
     "Gravity",
     "Ground",
     "ImplicitMidpoint",

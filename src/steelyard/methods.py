@@ -70,6 +70,8 @@ class Method:
                     f"ClosedForm cannot step a {type(other[0]).__name__}; the limit is free flight "
                     "with constant acceleration and damping. Use Rattle()."
                 )
+        elif self.integrator.holds_links:
+            self._refuse_beside_links(name, scene)
         elif held and not self.integrator.solver_stages:
             raise ValueError(
                 f"{name} cannot hold a {type(held[0]).__name__}; it steps particles under forces alone. "
@@ -114,6 +116,24 @@ class Method:
         ):
             raise ValueError(
                 "ExplicitEuler cannot drive a winch. Use SymplecticEuler() or Rattle()."
+            )
+
+    def _refuse_beside_links(self, name: str, scene: Scene) -> None:
+        """Raise if an integrator that holds links by itself cannot do the rest of a scene."""
+        if self.solver is not None:
+            raise ValueError(
+                f"{name} does not work with {type(self.solver).__name__}; it holds links itself. "
+                f"Use Method({name}()) without a solver."
+            )
+        for contact in scene.of(*CONTACTS):
+            raise ValueError(
+                f"{name} cannot hold a {type(contact).__name__}; it knows links and riders, no contacts. "
+                "Use Rattle() with Direct()."
+            )
+        if scene.of(UserForce) and not self.integrator.evaluations:
+            raise ValueError(
+                f"{name} cannot take a UserForce: it needs the force at states that only its own iteration "
+                "knows. Use Rattle() with Direct(), or LinearlyImplicit() where nothing is linked."
             )
 
     @staticmethod

@@ -21,6 +21,7 @@ SMOOTH_METHODS = [
     sy.LinearlyImplicit(),
     sy.BackwardEuler(),
     sy.ImplicitMidpoint(),
+    sy.GeneralisedAlpha(),
 ]
 STEPPING = [sy.ExplicitEuler(), sy.SymplecticEuler(), sy.Rattle(), *SMOOTH_METHODS]
 # Parts of whose step run backwards in time; they refuse drag and stiff springs.
@@ -220,6 +221,7 @@ def test_verlet_retraces_its_steps() -> None:
         (sy.LinearlyImplicit(), 0.0),
         (sy.BackwardEuler(), -0.5),
         (sy.ImplicitMidpoint(), 0.0),
+        (sy.GeneralisedAlpha(), 0.0),
     ],
     ids=lambda value: type(value).__name__,
 )

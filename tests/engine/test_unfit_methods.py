@@ -83,6 +83,7 @@ UNFIT = [
     (sy.ClosedForm(), sy.GaussSeidel()),
     (sy.ClosedForm(), sy.WorstFirst()),
     *((i, s) for i in SMOOTH for s in (None, sy.Direct(), sy.GaussSeidel(), sy.WorstFirst())),
+    *((sy.GeneralisedAlpha(), s) for s in (sy.Direct(), sy.GaussSeidel(), sy.WorstFirst())),
 ]
 FIT = [
     (sy.ExplicitEuler(), sy.WorstFirst()),
@@ -103,8 +104,10 @@ def _names(method: Any) -> str:
 def test_every_combination_is_either_fit_or_unfit() -> None:
     integrators = [sy.ExplicitEuler, sy.SymplecticEuler, sy.Rattle, sy.ClosedForm]
     integrators += [*map(type, SMOOTH), sy.ComposedRattle]
+    integrators.append(sy.GeneralisedAlpha)
     solvers = [type(None), sy.WorstFirst, sy.Direct, sy.GaussSeidel]
     tried = [(type(i), type(s)) for i, s in UNFIT + FIT]
+    tried.append((sy.GeneralisedAlpha, type(None)))  # takes links, no contacts
     assert sorted(map(str, tried)) == sorted(str((i, s)) for i in integrators for s in solvers)
 
 
@@ -116,7 +119,7 @@ def test_a_method_that_cannot_hold_what_the_scene_holds(method: Any, k: int) -> 
     scene.add(thing)
     integrator, solver = method
     words = [type(integrator).__name__, "Use "]
-    if solver is None or not integrator.solver_stages:
+    if solver is None or not (integrator.solver_stages or integrator.holds_links):
         words.append(type(thing).__name__)
     else:
         words.append(type(solver).__name__)
