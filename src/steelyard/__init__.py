@@ -4,8 +4,10 @@ from . import draw, scenes
 from .choice import CANDIDATES, Candidate, Choice, Considered, candidates, choose_method
 from .integrators.backward_euler import BackwardEuler
 from .integrators.closed_form import ClosedForm, flight, flight_fall_time, flight_impact
+from .integrators.composed_rattle import ComposedRattle
 from .integrators.explicit_euler import ExplicitEuler
 from .integrators.exponential import ExponentialRungeKutta
+from .integrators.generalised_alpha import GeneralisedAlpha
 from .integrators.implicit_midpoint import ImplicitMidpoint
 from .integrators.linearly_implicit import LinearlyImplicit
 from .integrators.rattle import Rattle
@@ -49,6 +51,7 @@ __all__ = [
     "Candidate",
     "Choice",
     "ClosedForm",
+    "ComposedRattle",
     "Considered",
     "ContactGenerator",
     "Direct",
@@ -56,6 +59,7 @@ __all__ = [
     "ExplicitEuler",
     "ExponentialRungeKutta",
     "GaussSeidel",
+    "GeneralisedAlpha",
     "Gravity",
     "Ground",
     "ImplicitMidpoint",

@@ -20,8 +20,10 @@ import numpy as np
 from .integrators.backward_euler import BackwardEuler
 from .integrators.base import Integrator
 from .integrators.closed_form import ClosedForm
+from .integrators.composed_rattle import ComposedRattle
 from .integrators.explicit_euler import ExplicitEuler
 from .integrators.exponential import ExponentialRungeKutta
+from .integrators.generalised_alpha import GeneralisedAlpha
 from .integrators.implicit_midpoint import ImplicitMidpoint
 from .integrators.linearly_implicit import LinearlyImplicit
 from .integrators.rattle import Rattle
@@ -73,7 +75,12 @@ CANDIDATES = (
     Candidate("backward Euler", BackwardEuler()),
     Candidate("implicit midpoint", ImplicitMidpoint()),
     Candidate("closed form", ClosedForm()),
+    Candidate("velocity Verlet, order 4", ComposedRattle()),
+    Candidate("velocity Verlet, order 6", ComposedRattle(substeps=9)),
     Candidate("RATTLE, direct", Rattle(), Direct()),
+    Candidate("RATTLE of order 4, direct", ComposedRattle(), Direct()),
+    Candidate("RATTLE of order 6, direct", ComposedRattle(substeps=9), Direct()),
+    Candidate("generalised-alpha", GeneralisedAlpha()),
     Candidate("RATTLE, Gauss-Seidel x 4", Rattle(), GaussSeidel(passes=4)),
     Candidate("RATTLE, Gauss-Seidel x 16", Rattle(), GaussSeidel(passes=16)),
     Candidate("RATTLE, Gauss-Seidel x 64", Rattle(), GaussSeidel(passes=64)),
@@ -238,7 +245,8 @@ def candidates(scene: Scene) -> Iterator[Candidate]:
         )
     )
     for candidate in CANDIDATES:
-        if held == (candidate.solver is not None):
+        holds = candidate.solver is not None or candidate.integrator.holds_links
+        if held == holds:
             try:
                 candidate.at(1.0).refuse(scene)
             except ValueError:

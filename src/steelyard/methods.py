@@ -11,7 +11,7 @@ from .integrators.rattle import Rattle
 from .integrators.rk4 import RungeKutta4
 from .integrators.symplectic_euler import SymplecticEuler
 from .scene import checks
-from .scene.forces import StiffSpring, UserForce
+from .scene.forces import Drag, StiffSpring, UserForce
 from .scene.links import Cable, CableConstraint
 from .scene.rider import Rider
 from .scene.scene import CONTACTS, FORCES, LINKS, Scene
@@ -70,6 +70,8 @@ class Method:
                     f"ClosedForm cannot step a {type(other[0]).__name__}; the limit is free flight "
                     "with constant acceleration and damping. Use Rattle()."
                 )
+        elif self.integrator.holds_links:
+            self._refuse_beside_links(name, scene)
         elif held and not self.integrator.solver_stages:
             raise ValueError(
                 f"{name} cannot hold a {type(held[0]).__name__}; it steps particles under forces alone. "
@@ -99,6 +101,8 @@ class Method:
                 "WorstFirst cannot hold a Rider: it has no impulse for it. Use Direct(), or spread "
                 "the load's mass over the deck (steelyard.scenes.lumped_masses)."
             )
+        if self.integrator.reverses:
+            self._refuse_backwards(name, scene)
         sprung = {id(spring.particle) for spring in scene.of(StiffSpring)}
         for thing in held:
             if any(id(p) in sprung for p in scene.touched(thing)):
@@ -112,6 +116,33 @@ class Method:
         ):
             raise ValueError(
                 "ExplicitEuler cannot drive a winch. Use SymplecticEuler() or Rattle()."
+            )
+
+    def _refuse_beside_links(self, name: str, scene: Scene) -> None:
+        """Raise if an integrator that holds links by itself cannot do the rest of a scene."""
+        if self.solver is not None:
+            raise ValueError(
+                f"{name} does not work with {type(self.solver).__name__}; it holds links itself. "
+                f"Use Method({name}()) without a solver."
+            )
+        for contact in scene.of(*CONTACTS):
+            raise ValueError(
+                f"{name} cannot hold a {type(contact).__name__}; it knows links and riders, no contacts. "
+                "Use Rattle() with Direct()."
+            )
+        if scene.of(UserForce) and not self.integrator.evaluations:
+            raise ValueError(
+                f"{name} cannot take a UserForce: it needs the force at states that only its own iteration "
+                "knows. Use Rattle() with Direct(), or LinearlyImplicit() where nothing is linked."
+            )
+
+    @staticmethod
+    def _refuse_backwards(name: str, scene: Scene) -> None:
+        """Raise if a scene holds what cannot run backwards in time."""
+        for thing in scene.of(Cable, CableConstraint, *CONTACTS, Drag, StiffSpring):
+            raise ValueError(
+                f"{name} cannot step a {type(thing).__name__}: parts of its step run backwards in time, where "
+                "impacts and drag have no meaning. Use Rattle(), or rods and AnchoredSpring."
             )
 
     @staticmethod

@@ -238,7 +238,7 @@ def carry(old: Model, old_state: np.ndarray, new: Model, state: np.ndarray) -> N
                     if id(particle) in before:
                         source = old.places[key][0] + 3 * before[id(particle)]
                         state[row + 3 * p : row + 3 * p + 3] = old_state[source : source + 3]
-        elif key in old.places and old.places[key][1] == size:
+        elif name != "mark" and key in old.places and old.places[key][1] == size:
             source = old.places[key][0]
             state[row : row + size] = old_state[source : source + size]
     for key, value in old.parameters.values.items():

@@ -25,6 +25,11 @@ RESOLVED = {
     "ExplicitEuler-WorstFirst": (sy.ExplicitEuler(), sy.WorstFirst()),
 }
 METHODS = STAGED | RESOLVED
+# What cannot hold cables and contacts.
+COMPOSED = {
+    "ComposedRattle-Direct": (sy.ComposedRattle(), sy.Direct()),
+    "ComposedRattle-GaussSeidel": (sy.ComposedRattle(), sy.GaussSeidel(passes=60)),
+}
 # What steps particles under forces alone.
 SMOOTH = {
     "RungeKutta4": (sy.RungeKutta4(), None),
@@ -34,6 +39,11 @@ SMOOTH = {
     "ImplicitMidpoint": (sy.ImplicitMidpoint(tolerance=1e-6), None),
 }
 
+# What holds links by itself.
+LINKED = {
+    "GeneralisedAlpha": (sy.GeneralisedAlpha(), None),
+}
+
 # An exact solver's residual is its tolerance; the sweeps' what 60 passes leave on the tests' scenes;
 # the source's resolver leaves what the last contacts resolved did to the others.
 _RESIDUAL = {"Direct": 1e-12, "GaussSeidel": 1e-4, "WorstFirst": 0.1}
@@ -41,7 +51,7 @@ _RESIDUAL = {"Direct": 1e-12, "GaussSeidel": 1e-4, "WorstFirst": 0.1}
 
 def method(name: str, *, dt: float) -> sy.Method:
     """A method of the tables above."""
-    integrator, solver = (METHODS | SMOOTH)[name]
+    integrator, solver = (METHODS | COMPOSED | SMOOTH | LINKED)[name]
     return sy.Method(integrator, solver, dt=dt)
 
 

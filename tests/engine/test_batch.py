@@ -15,7 +15,15 @@ import pytest
 
 import steelyard as sy
 from benchmarks.scenes import bridge, tumbling_platform
-from tests.engine.builders import METHODS, SMOOTH, Array, from_particle_scene, method
+from tests.engine.builders import (
+    COMPOSED,
+    LINKED,
+    METHODS,
+    SMOOTH,
+    Array,
+    from_particle_scene,
+    method,
+)
 
 DT = 1 / 60
 STEPS = 60
@@ -58,6 +66,22 @@ def net() -> sy.Scene:
         scene.add(sy.Cable(row[k - 1], p, 0.55, restitution=0.5))
         if k % 2:
             scene.add(sy.CableConstraint(p, (0.5 * k, 3.0, 0.2), 1.3, restitution=0.8))
+    return scene
+
+
+def swing() -> sy.Scene:
+    """A rigid cluster with a load on its deck, from which rods hang, on a spring."""
+    scene = from_particle_scene(replace(tumbling_platform(), gravity=(0.0, -9.81, 0.0)))
+    deck = scene.particles[2:6]
+    place = np.mean([p.position for p in deck], axis=0)
+    scene.add(sy.Rider(scene.add(sy.Particle(position=place, mass=10.0)), deck))
+    scene.add(sy.AnchoredSpring(deck[0], (0.0, 6.0, 0.0), 200.0, 2.0))
+    last = scene.particles[0]
+    for _ in range(3):
+        below = np.add(last.position, (0.0, -0.5, 0.1))
+        p = scene.add(sy.Particle(position=below, mass=1.0))
+        scene.add(sy.Rod(last, p))
+        last = p
     return scene
 
 
@@ -142,6 +166,21 @@ def blown_mesh() -> sy.Scene:
     return scene
 
 
+def ridden_bridge() -> sy.Scene:
+    """Cables under a load that moves, with springs and drag."""
+    scene = sy.scenes.bridge(load=200.0, place=(2.0, 0.5))
+    some = scene.particles
+    scene.add(sy.Spring(some[0], some[11], 50.0, 8.0))
+    scene.add(sy.AnchoredSpring(some[4], (0.0, 1.0, 0.0), 80.0, 0.5))
+    scene.add(sy.Drag(linear=0.1, quadratic=0.05, wind=(1.0, 0.0, 0.5)))
+    return scene
+
+
+def tumbling() -> sy.Scene:
+    """Rods, some redundant, in free fall."""
+    return from_particle_scene(replace(tumbling_platform(), gravity=(0.0, -9.81, 0.0)))
+
+
 SCENES: dict[str, Callable[[], sy.Scene]] = {
     "landing bridge": landing_bridge,
     "falling platform": falling_platform,
@@ -150,23 +189,30 @@ SCENES: dict[str, Callable[[], sy.Scene]] = {
     "cage": cage,
     "balls": balls,
     "springs": springs,
+    "swing": swing,
     "mesh": mesh,
     "blown mesh": blown_mesh,
+    "ridden bridge": ridden_bridge,
+    "tumbling": tumbling,
 }
+FOR_LINKED = ("net", "cage", "mesh", "ridden bridge", "tumbling")
 FORCES_ALONE = ("mesh", "blown mesh")
+NO_IMPACTS = ("swing",)
 PAIRS = [
     (scene, name)
     for scene in SCENES
     for name in METHODS
-    if scene not in FORCES_ALONE
+    if scene not in (*FORCES_ALONE, *NO_IMPACTS, "ridden bridge", "tumbling")
     if not (scene == "ridden platform" and name.endswith("WorstFirst"))
 ]
+PAIRS += [(scene, name) for scene in NO_IMPACTS for name in COMPOSED]
 PAIRS += [
     (scene, name)
     for scene in FORCES_ALONE
     for name in SMOOTH
     if not (scene == "blown mesh" and name == "ImplicitMidpoint")
 ]
+PAIRS += [(scene, name) for scene in FOR_LINKED for name in LINKED]
 
 
 def vary(world: sy.World, kinds: Sequence[int]) -> None:
@@ -186,7 +232,8 @@ def vary(world: sy.World, kinds: Sequence[int]) -> None:
         world[ground].restitution = np.array([[rng.uniform(0.0, 0.9)] for rng in draws])
     for rider in world.scene.of(sy.Rider):
         rates = np.array([rng.uniform(-0.2, 0.2) for rng in draws])
-        world[rider].rates = rates[:, None] * [1.0, -1.0, 1.0, -1.0]
+        signs = np.resize([1.0, -1.0], len(rider.deck))
+        world[rider].rates = rates[:, None] * signs
 
 
 def build(scene: str, name: str, kinds: Sequence[int], *, threads: int = 1) -> sy.World:

@@ -77,6 +77,7 @@ def test_links_and_contacts_cost_what_the_solver_remembers_of_them(kind: str) ->
     "method",
     [
         sy.Method(sy.Rattle()),
+        sy.Method(sy.ComposedRattle()),
         sy.Method(sy.ClosedForm()),
         sy.Method(sy.RungeKutta4()),
         sy.Method(sy.ExponentialRungeKutta()),

@@ -75,12 +75,15 @@ UNFIT = [
     (sy.ExplicitEuler(), sy.GaussSeidel()),
     (sy.SymplecticEuler(), None),
     (sy.Rattle(), None),
+    (sy.ComposedRattle(), None),
+    (sy.ComposedRattle(), sy.WorstFirst()),
     (sy.Rattle(), sy.WorstFirst()),
     (sy.ClosedForm(), None),
     (sy.ClosedForm(), sy.Direct()),
     (sy.ClosedForm(), sy.GaussSeidel()),
     (sy.ClosedForm(), sy.WorstFirst()),
     *((i, s) for i in SMOOTH for s in (None, sy.Direct(), sy.GaussSeidel(), sy.WorstFirst())),
+    *((sy.GeneralisedAlpha(), s) for s in (sy.Direct(), sy.GaussSeidel(), sy.WorstFirst())),
 ]
 FIT = [
     (sy.ExplicitEuler(), sy.WorstFirst()),
@@ -89,6 +92,8 @@ FIT = [
     (sy.SymplecticEuler(), sy.GaussSeidel()),
     (sy.Rattle(), sy.Direct()),
     (sy.Rattle(), sy.GaussSeidel()),
+    (sy.ComposedRattle(), sy.Direct()),
+    (sy.ComposedRattle(), sy.GaussSeidel()),
 ]
 
 
@@ -98,9 +103,11 @@ def _names(method: Any) -> str:
 
 def test_every_combination_is_either_fit_or_unfit() -> None:
     integrators = [sy.ExplicitEuler, sy.SymplecticEuler, sy.Rattle, sy.ClosedForm]
-    integrators += map(type, SMOOTH)
+    integrators += [*map(type, SMOOTH), sy.ComposedRattle]
+    integrators.append(sy.GeneralisedAlpha)
     solvers = [type(None), sy.WorstFirst, sy.Direct, sy.GaussSeidel]
     tried = [(type(i), type(s)) for i, s in UNFIT + FIT]
+    tried.append((sy.GeneralisedAlpha, type(None)))  # takes links, no contacts
     assert sorted(map(str, tried)) == sorted(str((i, s)) for i in integrators for s in solvers)
 
 
@@ -112,7 +119,7 @@ def test_a_method_that_cannot_hold_what_the_scene_holds(method: Any, k: int) -> 
     scene.add(thing)
     integrator, solver = method
     words = [type(integrator).__name__, "Use "]
-    if solver is None or not integrator.solver_stages:
+    if solver is None or not (integrator.solver_stages or integrator.holds_links):
         words.append(type(thing).__name__)
     else:
         words.append(type(solver).__name__)
@@ -128,6 +135,9 @@ def test_a_method_that_can_hold_it(method: Any, k: int) -> None:
     scene.add(thing)
     if isinstance(thing, sy.Rider) and isinstance(method[1], sy.WorstFirst):
         with refused("WorstFirst", "Rider", "Direct()", kind=ValueError):
+            sy.World(scene, method=sy.Method(*method))
+    elif method[0].reverses and isinstance(thing, (sy.Cable, sy.CableConstraint, *CONTACTS)):
+        with refused("ComposedRattle", type(thing).__name__, "backwards", kind=ValueError):
             sy.World(scene, method=sy.Method(*method))
     else:
         world = sy.World(scene, method=sy.Method(*method))

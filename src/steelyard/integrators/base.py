@@ -36,6 +36,21 @@ class Integrator:
     #: Whether it works with a solver of displacements and velocities (True), of impulses (False).
     solver_stages: ClassVar[tuple[bool, ...]] = ()
 
+    #: Whether part of its step runs backwards in time.
+    reverses: ClassVar[bool] = False
+
+    @property
+    def fractions(self) -> tuple[float, ...]:
+        """Length of each substep over that of the step."""
+        return (1.0,)
+
+    #: Whether it holds links and riders in an iteration of its own, without a solver.
+    holds_links: ClassVar[bool] = False
+
+    def constants(self, dt: float) -> tuple[float, ...]:
+        """Numbers that its stages find in rows of the scratch, given the step [s]."""
+        return ()
+
     def recipe(self, solver: Solver | None) -> Recipe:
         """Stages of a step in order, each with its part: of most methods 0, or 1 for what follows the new positions.
 

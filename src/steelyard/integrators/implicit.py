@@ -73,7 +73,7 @@ def _begin(tape, s, reach):
 
 
 @inner
-def _add_springs(tape, s, reach):
+def add_spring_blocks(tape, s, reach):
     zero = splat(0.0)
     one = splat(1.0)
     square = reach * reach
@@ -123,7 +123,7 @@ def _add_springs(tape, s, reach):
 
 
 @inner
-def _add_drags(tape, s, reach):
+def add_drag_blocks(tape, s, reach):
     zero = splat(0.0)
     one = splat(1.0)
     at = tape[H_DRAGS]
@@ -143,7 +143,7 @@ def _add_drags(tape, s, reach):
 
 
 @inner
-def _add_floats(tape, s, reach):
+def add_float_blocks(tape, s, reach):
     zero = splat(0.0)
     at = tape[H_BUOYANCIES]
     for index in range(tape[at]):
@@ -163,9 +163,9 @@ def factorise_motion(tape, s, skip, part):
     if any_lane(load(s, tape[H_ACTIVE]) > splat(0.5)):
         reach = load(s, tape[H_REACH])
         _begin(tape, s, reach)
-        _add_springs(tape, s, reach)
-        _add_drags(tape, s, reach)
-        _add_floats(tape, s, reach)
+        add_spring_blocks(tape, s, reach)
+        add_drag_blocks(tape, s, reach)
+        add_float_blocks(tape, s, reach)
         block_ldl.factor(tape, tape[H_FACTOR], s, skip)
 
 

@@ -27,6 +27,7 @@ from .forces import add_forces
 from .network import Network
 from .parameters import PARTICLES, Key, Parameters, Slot
 from .propagators import add_propagators
+from .saddle import Saddle
 from .stiffness import Stiffness
 from .tape import CONTACT, HEADER, LINK
 
@@ -96,10 +97,15 @@ class Compiler:
         self.start: list[float] = []
         #: First row of minus the weights at the step's start, by rider.
         self.held: dict[int, int] = {}
-        sparse = method.solver is not None and method.solver.sparse
-        self.network = Network(self) if sparse else None
+        integrator, solver = method.integrator, method.solver
+        #: Whether links and riders keep multipliers from step to step.
+        self.staged = integrator.holds_links or (solver is not None and solver.staged)
+        self.network = Network(self) if solver is not None and solver.sparse else None
+        self.saddle = Saddle(self) if integrator.holds_links else None
         if self.network is not None:
             self.links = self.network.choose()
+        if self.saddle is not None:
+            self.links = self.saddle.choose()
         chosen = set(map(id, self.links))
         self.implied = [link for link in scene.of(*LINKS) if id(link) not in chosen]
 
@@ -177,6 +183,9 @@ class Compiler:
         if self.method.solver is not None and not self.method.solver.staged:
             most = len(self.links) + len(self.contacts)
             header["moves"] = self.state((PARTICLES, "moves"), np.zeros(6 * most))
+        if self.saddle is not None:
+            header["filtered"] = self.state((PARTICLES, "filtered"), [0.0] * 3 * count)
+            header["mark"] = self.state((PARTICLES, "mark"), [np.nan])
         header["time"] = self.state((PARTICLES, "time"), [0.0])
         header["unsettled"] = self.state((PARTICLES, "unsettled"), [0.0])
         header["nonfinite"] = self.state((PARTICLES, "nonfinite"), [0.0])
@@ -208,7 +217,7 @@ class Compiler:
 
     def _multipliers(self) -> None:
         """Impulses of the last step, from which the next one starts."""
-        if self.method.solver is None or not self.method.solver.staged:
+        if not self.staged:
             return
         for link in self.links:
             self.state((link, "multiplier"), [0.0])
@@ -273,6 +282,8 @@ class Compiler:
             self.header["damping"] = self.slot(3 * count, (damping_key,), phis)
         elif method.integrator.smooth:
             self.header["damping"] = self.slot(count, (damping_key,), derived.rate)
+        elif len(method.integrator.fractions) > 1:
+            self.header["damping"] = self.take(count)
         else:
             self.header["damping"] = self.slot(
                 count, (damping_key,), lambda value: derived.decay(value, share)
@@ -282,6 +293,36 @@ class Compiler:
         stiff = {id(spring.particle) for spring in flows}
         self.sections["drift"] = [p for p, x in enumerate(self.particles) if id(x) not in stiff]
         self.header["dt"] = self.constant(method.dt)
+        self._substeps()
+
+    def _substeps(self) -> None:
+        """Lengths, what damping keeps and how impulses grow, of each part of a step that is made of several."""
+        fractions = self.method.integrator.fractions
+        if len(fractions) == 1:
+            return
+        share = self.method.integrator.damping_share * self.method.dt
+        kept = {
+            part: self.slot(
+                len(self.particles),
+                ((PARTICLES, "damping"),),
+                lambda value, part=part: derived.decay(value, part * share),
+            )
+            for part in set(fractions)
+        }
+        records: list[int] = []
+        for part, before in zip(fractions, (fractions[-1], *fractions), strict=False):
+            records += [
+                self.constant(part * self.method.dt),
+                kept[part],
+                self.constant((part / before) ** 2),
+            ]
+        self.sections["substeps"] = [*records, self.constant(self.method.dt)]
+        self.counts["substeps"] = len(fractions)
+
+    def _constants(self) -> int:
+        """Numbers that the integrator's stages need."""
+        numbers = np.array(self.method.integrator.constants(self.method.dt))
+        return self.slot(len(numbers), (), lambda: numbers)
 
     def some(self, chosen: Any) -> list[Particle]:
         """The chosen particles, or all."""
@@ -306,7 +347,11 @@ class Compiler:
         self.header["tolerance"] = self.constant(getattr(settings, "tolerance", 0.0))
         self.header["active"] = self.take(1) if self.method.integrator.reach > 0.0 else self.one
         self.header["work"] = self.take(self.method.integrator.work * len(self.particles))
-        if self.method.integrator.reach > 0.0:
+        self.header["constants"] = self._constants()
+        if self.saddle is not None:
+            self.header["jolt"] = self.take(1)
+            self.saddle.build()
+        elif self.method.integrator.reach > 0.0:
             Stiffness(self).build()
         if self.method.integrator.linear:
             add_propagators(self)

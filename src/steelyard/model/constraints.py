@@ -27,7 +27,7 @@ def add_links(c: Compiler) -> None:
     count = len(c.particles)
     constrained = bool(c.links or c.implied or c.scene.of(Rider) or c.contacts)
     c.header["constrained"] = int(constrained)
-    staged = constrained and c.method.solver is not None and c.method.solver.staged
+    staged = constrained and c.staged
     for name in ("start", "free"):
         c.header[name] = c.take(3 * count) if constrained else -1
     c.header["impulse"] = c.take(3 * count + 3) if staged else -1
@@ -108,7 +108,7 @@ def add_contacts(c: Compiler) -> None:
     """A record per pair that can touch."""
     records: list[int] = []
     surfaces: dict[int, tuple[int, int, int]] = {}
-    staged = c.method.solver is not None and c.method.solver.staged
+    staged = c.staged
     radii: dict[int, int] = {}
     for generator, a, b, k in c.contacts:
         if id(generator) not in surfaces:

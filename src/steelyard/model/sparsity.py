@@ -71,6 +71,26 @@ def minimum_degree(adjacency: Sequence[Iterable[int]], first: int, last: int) ->
     return order
 
 
+def minimum_degree_after(
+    adjacency: Sequence[Iterable[int]], widths: Sequence[int], after: Sequence[Iterable[int]]
+) -> list[int]:
+    """Minimum degree over blocks of different widths, each after all blocks that it must come ``after``.
+
+    The degree is what it costs: the widths of the neighbours left, summed; ties go to the lowest index.
+    """
+    graph = {block: set(around) for block, around in enumerate(adjacency)}
+    order = []
+    while graph:
+        free = (block for block in graph if graph.keys().isdisjoint(after[block]))
+        block = min(free, key=lambda key: (sum(widths[k] for k in graph[key]), key))
+        around = graph.pop(block)
+        for other in around:
+            graph[other] |= around
+            graph[other] -= {other, block}
+        order.append(block)
+    return order
+
+
 def minimum_fill(adjacency: Sequence[Iterable[int]]) -> list[int]:
     """Elimination order of all blocks: always one whose neighbours lack fewest couplings among themselves.
 

@@ -6,6 +6,7 @@ springs between them; their order (minimum fill), fill and index tapes are those
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -30,6 +31,9 @@ class Stiffness:
         self.particles = [p for p, x in enumerate(compiler.particles) if x.movable]
         self.block = {p: k for k, p in enumerate(self.particles)}
         self.count = self.structural = len(self.particles)
+        #: First rows of diagonal blocks, by position in the order, and of couplings, by two of them.
+        self.diagonal: dict[int, int] = {}
+        self.a: dict[tuple[int, int], int] = {}
 
     def build(self) -> None:
         """Fill the compiler's sections."""
@@ -65,6 +69,11 @@ class Stiffness:
         # Pivots need be no more than positive: the matrix is positive definite, however stiff its springs.
         self.reference = dict.fromkeys(range(self.count), c.zero)
         c.header["right"] = c.take(3 * self.count)
+        self._constants()
+
+    def _constants(self) -> None:
+        """Rows that no unknown has, masses, and how far the method reaches."""
+        c = self.c
         self.spare = c.take(9)
         c.header["reach"] = c.constant(c.method.integrator.reach * c.method.dt)
         c.header["mass"] = c.slot(
@@ -85,34 +94,41 @@ class Stiffness:
         c.sections["unknowns"] = [
             word
             for k, p in enumerate(self.particles)
-            for word in (3 * p, p, c.header["right"] + 3 * k, self._diagonal(p))
+            for word in (3 * p, p, self._right(k), self._diagonal(p))
         ]
+
+    def _right(self, block: int) -> int:
+        """First row of a block's right side."""
+        return self.c.header["right"] + 3 * block
 
     def _springs(self) -> None:
         """Per spring: the blocks of its ends and of their coupling, and the lowest stiffness across that counts."""
         c = self.c
-        touching = np.zeros(len(c.particles))
-        for ends in c.spring_ends:
-            for p in ends:
-                if p is not None:
-                    touching[p] += 1.0
-        square = 4.0 * (c.method.integrator.reach * c.method.dt) ** 2
+        ends = [tuple(self.block[p] for p in some if p is not None) for some in c.spring_ends]
         records: list[int] = []
-        for a, b in c.spring_ends:
-            some = [p for p in (a, b) if p is not None]
-
-            def limit(inverse: np.ndarray, some: list[int] = some) -> np.ndarray:
-                loads = [square * touching[p] * inverse[p : p + 1] for p in some]
-                return -1.0 / np.max(loads, axis=0) if loads else np.zeros(1)
-
-            row = c.slot(1, ((PARTICLES, "inverse_mass"),), limit)
-            records += [
-                self._diagonal(a),
-                self._diagonal(b),
-                self._coupling(a, b),
-                row,
-            ]
+        square = (c.method.integrator.reach * c.method.dt) ** 2
+        for (a, b), row in zip(c.spring_ends, self._limits(ends, square), strict=True):
+            records += [self._diagonal(a), self._diagonal(b), self._coupling(a, b), row]
         c.sections["spring_blocks"] = records
+
+    def _limits(self, ends: Sequence[Sequence[int]], square: float = 1.0) -> list[int]:
+        """Rows of -m/(4 s square) for every spring or link, m and s the mass and the number of them at one of its ends.
+
+        The lesser counts, so that all together take half of every mass at most.
+        """
+        c = self.c
+        touching = np.zeros(self.count)
+        for some in ends:
+            touching[list(some)] += 4.0 * square
+        rows = []
+        for some in ends:
+
+            def limit(inverse: np.ndarray, some: Sequence[int] = some) -> np.ndarray:
+                loads = [touching[k] * inverse[self.particles[k]] for k in some]
+                return -1.0 / np.max(loads, axis=0, keepdims=True) if loads else np.zeros(1)
+
+            rows.append(c.slot(1, ((PARTICLES, "inverse_mass"),), limit))
+        return rows
 
     def _coupling(self, a: int | None, b: int | None) -> int:
         if a is None or b is None:

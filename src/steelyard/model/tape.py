@@ -89,12 +89,21 @@ from __future__ import annotations
     H_DRAG_BLOCKS,
     H_FLOAT_BLOCKS,
     H_PROPAGATORS,
-) = range(80)
-HEADER = 80
+    H_SUBSTEPS,
+    H_CONSTANTS,
+    H_FILTERED,
+    H_MARK,
+    H_JOLT,
+    H_SADDLE_SOLVE,
+    H_SADDLE_LINKS,
+    H_SADDLE_RIDERS,
+) = range(88)
+HEADER = 88
 
 # Width of the records of links and contacts; ``model.compile`` writes them field by field.
 LINK = 17
 CONTACT = 24
+SADDLE_LINK = 10
 
 # Records of clusters and of loads on them: what comes before their lists, and an entry of a cluster's. Work rows of a
 # cluster: inertia, inverse of that with loads, quaternion (angular velocity in the velocity stage), shift of the centre
