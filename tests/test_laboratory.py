@@ -50,7 +50,7 @@ def test_a_wrong_engine_is_caught(name: str) -> None:
     defects = {defect: build() for defect, build in problem.wrong.items()}
     told = 0
     for defect, scene in defects.items():
-        held = bool(scene.of(*methods.HELD))
+        held = any(candidate.solver for candidate in sy.candidates(scene))
         entry = methods.named("RATTLE, direct" if held else "velocity Verlet")
         try:
             found = worst(problem.errors(motion(problem, scene, entry)))

@@ -30,7 +30,6 @@ from .integrators.rattle import Rattle
 from .integrators.rk4 import RungeKutta4
 from .integrators.symplectic_euler import SymplecticEuler
 from .methods import Method
-from .model.tape import HEADER
 from .scene import checks
 from .scene.contacts import ContactGenerator, Ground, LinePlatform
 from .scene.links import Cable, CableConstraint, Rod, RodConstraint
@@ -191,8 +190,7 @@ class _Runs:
         self._tracks: dict[int, _Track | None] = {}
         model = self._build(1).model
         constant, particle, word = cost_table()[candidate.name]
-        words = len(model.tape) - HEADER
-        self.step_cost = constant + particle * len(scene.particles) + word * words
+        self.step_cost = constant + particle * len(scene.particles) + word * model.words
 
     def dt(self, steps: int) -> float:
         """Step [s]."""

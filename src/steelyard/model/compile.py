@@ -66,6 +66,11 @@ class Model:
     blocks: int = 0
     dropped: list[Any] = field(default_factory=list)
 
+    @property
+    def words(self) -> int:
+        """Words on the tape behind its header: what the kernels of a step work through."""
+        return len(self.tape) - HEADER
+
 
 class Compiler:
     """Allocates rows and writes the tape; one method per kind of thing."""

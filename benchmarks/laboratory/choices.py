@@ -1,0 +1,147 @@
+"""How good the automatic choice is: on every reference problem, at tolerances from 1e-2 to 1e-8.
+
+    python -m benchmarks.laboratory.choices
+
+For each: the method that ``choose_method`` picks is run and scored by the problem's own errors, and its cost is held
+against that of the cheapest method known there. Costs are of the charts: what a step took, over the largest step
+that holds the tolerance, found between two rungs of the ladder by the slope between them.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+import steelyard as sy
+from benchmarks import record
+from benchmarks.laboratory import problems
+from benchmarks.laboratory.engines import BrokenRunError, EngineRun
+from benchmarks.laboratory.problem import Problem, worst
+
+CHARTS = record.RESULTS / "charts"
+TOLERANCES = tuple(10.0**-k for k in range(2, 9))
+
+
+def main() -> None:
+    """Judge, print and write results/choices.json."""
+    rows = [
+        row
+        for name in problems.NAMES
+        for problem in problems.load(name)
+        for row in judge(problem, _points(name, problem))
+    ]
+    record.write("choices", {"choices": rows}, directory=record.RESULTS)
+    table = Table("problem", "tolerance", "choice", "error", "cost over the best", "the best")
+    for row in rows:
+        table.add_row(
+            row["problem"],
+            f"{row['tolerance']:.0e}",
+            row["choice"] or row["refusal"],
+            f"{row['error']:.1e}" if row["error"] is not None else "",
+            f"{row['ratio']:.2f}" if row["ratio"] else "",
+            row["best"] or "none",
+        )
+    Console(width=160).print(table)
+    chosen = [row for row in rows if row["choice"]]
+    ratios = [row["ratio"] for row in chosen if row["ratio"]]
+    missed = sum(bool(row["missed"]) for row in rows)
+    print(
+        f"{len(chosen)} of {len(rows)} chosen, {sum(not row['held'] for row in chosen)} beyond the tolerance; cost "
+        f"over the best: median {np.median(ratios):.2f}, largest {max(ratios):.2f}, above 1.2 in "
+        f"{sum(ratio > 1.2 for ratio in ratios)}; {missed} refused that a method reaches"
+    )
+
+
+def judge(problem: Problem, points: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """A row per tolerance."""
+    rows = []
+    for tolerance in TOLERANCES:
+        costs = cheapest(points, tolerance)
+        best = min(costs, key=lambda name: costs[name], default=None)
+        row: dict[str, Any] = {
+            "problem": problem.name, "tolerance": tolerance, "choice": None, "refusal": "", "error": None,
+            "held": False, "ratio": None, "best": best, "missed": False,
+        }  # fmt: skip
+        try:
+            choice = sy.choose_method(
+                problem.scene(), tolerance=tolerance, horizon=problem.duration
+            )
+        except ValueError as refusal:
+            row |= {"refusal": str(refusal), "missed": best is not None}
+        else:
+            name = choice.considered[0].name
+            error = score(problem, choice.method)
+            step = step_cost(points, name)
+            row |= {
+                "choice": name,
+                "dt": choice.method.dt,
+                "error": error,
+                "held": error <= tolerance,
+            }
+            if best is not None and step is not None:
+                row["ratio"] = step / choice.method.dt / costs[best]
+        rows.append(row)
+    return rows
+
+
+def score(problem: Problem, method: sy.Method) -> float:
+    """Worst error of a method, its step shortened to divide the problem's stretch."""
+    dt = problem.stretch / math.ceil(problem.stretch / method.dt - 1e-9)
+    try:
+        run = EngineRun(
+            problem, problem.scene(), sy.Method(method.integrator, method.solver, dt=dt)
+        )
+        return worst(problem.errors(run.motion()))
+    except BrokenRunError:
+        return math.inf
+
+
+def step_cost(points: Sequence[Mapping[str, Any]], name: str) -> float | None:
+    """What a step of a method took [us per world]."""
+    costs = [
+        point["per_second"] * point["dt"]
+        for point in points
+        if point["method"] == name and point["per_second"] and point["worlds"] > 1
+    ]
+    return float(np.median(costs)) if costs else None
+
+
+def cheapest(points: Sequence[Mapping[str, Any]], tolerance: float) -> dict[str, float]:
+    """Cost per simulated second and world [us] of each of our methods that reaches a tolerance."""
+    listed = [candidate.name for candidate in sy.CANDIDATES]
+    costs = {}
+    for name in listed:
+        curve = sorted(
+            {
+                (point["dt"], point["worst"])
+                for point in points
+                if point["method"] == name and point["worst"]
+            },
+            reverse=True,
+        )
+        step = step_cost(points, name)
+        for k, (dt, error) in enumerate(curve):
+            if error <= tolerance and step is not None:
+                if k > 0 and curve[k - 1][1] > error:
+                    longer, larger = curve[k - 1]
+                    slope = math.log(larger / error) / math.log(longer / dt)
+                    dt = min(dt * (tolerance / error) ** (1.0 / slope), longer)
+                costs[name] = step / dt
+                break
+    return costs
+
+
+def _points(name: str, problem: Problem) -> list[dict[str, Any]]:
+    found = json.loads((CHARTS / f"{name}.json").read_text())["variants"]
+    points: list[dict[str, Any]] = found[problem.name]["points"]
+    return [point for point in points if not point["peer"]]
+
+
+if __name__ == "__main__":
+    main()

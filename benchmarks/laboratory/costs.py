@@ -1,0 +1,76 @@
+"""What a step of each method costs, as a fit over the charts: the table by which the engine chooses.
+
+    python -m benchmarks.laboratory.costs
+
+Reads what ``make charts`` measured and writes src/steelyard/costs.json. Kernels work through the index tape, so the
+cost of a step is fitted by a constant, a part per particle and a part per word on the tape, none negative, with
+relative errors. Scenes whose contacts are written in Python are left out: the calls cost more than the steps.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+from scipy.optimize import nnls
+
+import steelyard as sy
+from benchmarks import record
+from benchmarks.laboratory import methods, problems
+
+CHARTS = record.RESULTS / "charts"
+TABLE = record.ROOT / "src" / "steelyard" / "costs.json"
+
+
+def measured() -> dict[str, list[tuple[float, float, float]]]:
+    """By method: particles, words on the tape and cost of a step [us], a row per problem."""
+    rows: dict[str, list[tuple[float, float, float]]] = {}
+    for name in problems.NAMES:
+        found = json.loads((CHARTS / f"{name}.json").read_text())["variants"]
+        for problem in problems.load(name):
+            scene = problem.scene()
+            if scene.of(sy.ContactGenerator):
+                continue
+            for candidate in methods.able(problem, scene):
+                costs = [
+                    point["per_second"] * point["dt"]
+                    for point in found[problem.name]["points"]
+                    if point["method"] == candidate.name
+                    and point["per_second"]
+                    and point["worlds"] > 1
+                ]
+                if costs:
+                    world = sy.World(scene, method=candidate.at(problem.stretch / 8.0))
+                    rows.setdefault(candidate.name, []).append(
+                        (len(scene.particles), world.model.words, float(np.median(costs)))
+                    )
+    return rows
+
+
+def fit(rows: list[tuple[float, float, float]]) -> tuple[list[float], float]:
+    """Coefficients of a constant, particles and words [us]; root mean square of the relative error."""
+    data = np.array(rows)
+    features = np.column_stack([np.ones(len(data)), data[:, :2]]) / data[:, 2:]
+    coefficients, distance = nnls(features, np.ones(len(data)))
+    return coefficients.tolist(), float(distance) / math.sqrt(len(data))
+
+
+def main() -> None:
+    """Fit and write."""
+    rows = measured()
+    fits = {name: fit(rows[name]) for name in sorted(rows)}
+    payload = {
+        "source": "python -m benchmarks.laboratory.costs, from benchmarks/results/charts",
+        "units": "us per step and world: constant, per particle, per word on the tape",
+        "coefficients": {name: coefficients for name, (coefficients, _) in fits.items()},
+        "relative_error": {name: error for name, (_, error) in fits.items()},
+    }
+    TABLE.write_text(json.dumps(payload, indent=1) + "\n")
+    for name, (coefficients, error) in fits.items():
+        parts = "  ".join(f"{value:.3g}" for value in coefficients)
+        print(f"{name:<28} {parts}   within {error:.0%} over {len(rows[name])} scenes")
+
+
+if __name__ == "__main__":
+    main()
