@@ -112,6 +112,7 @@ class SpringCase:
         limit: largest stable h w at a damping ratio; 0 if none, inf if all.
         regained: h w from which on it is stable again, if it is.
         steps: steps h [s] at which it is measured.
+        solver: what holds the springs, if they are no forces.
     """
 
     name: str
@@ -121,6 +122,7 @@ class SpringCase:
     limit: Callable[[float], float]
     regained: Callable[[float], float] | None = None
     steps: Sequence[float] = DECADES
+    solver: Any = None
 
 
 #: Every integrator that steps springs, one line each.
@@ -141,6 +143,8 @@ CASES = (
     SpringCase("linearly implicit", sy.LinearlyImplicit(), "drag", "all", never),
     SpringCase("implicit midpoint", sy.ImplicitMidpoint(), "drag", "all", never),
     SpringCase("backward Euler", sy.BackwardEuler(), "drag", "all", never),
+    SpringCase("XPBD, a substep", sy.SymplecticEuler(), "drag", "all", never,
+               solver=sy.Xpbd(substeps=1)),
 )  # fmt: skip
 
 
@@ -170,7 +174,7 @@ class SpringBench:
         if case.damper == "force":
             scene.add(sy.UserForce(lambda x, v, t: -self.rate[:, None, None] * v))
         self.world = sy.World(
-            scene, worlds=2 * self.count, method=sy.Method(case.integrator, dt=dt)
+            scene, worlds=2 * self.count, method=sy.Method(case.integrator, case.solver, dt=dt)
         )
 
     def start(self, phase: Array) -> Array:
@@ -392,9 +396,10 @@ def _draw_left(panel: Axes, left: Mapping[str, Array]) -> None:
     a = np.geomspace(PHASES[0], PHASES[-1], 200)
     theory = {
         "backward Euler": 1.0 / np.hypot(1.0, a),
+        "XPBD, a substep": 1.0 / np.hypot(1.0, a),
         "linearly implicit": np.hypot(1.0, (1.0 - 2.0 * gamma) * a) / (1.0 + (gamma * a) ** 2),
     }
-    # Three of them leave all: their dots coincide, so they are drawn in falling size.
+    # Where all is left, and for backward Euler in two ways, dots coincide, so they are drawn in falling size.
     sizes = np.linspace(8.0, 3.0, len(left))
     for (name, values), size in zip(left.items(), sizes, strict=True):
         (dots,) = panel.plot(PHASES, values, "o", ms=size, label=name)

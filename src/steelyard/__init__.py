@@ -33,6 +33,7 @@ from .scene.scene import Scene
 from .solvers.direct import Direct
 from .solvers.gauss_seidel import GaussSeidel
 from .solvers.worst_first import WorstFirst
+from .solvers.xpbd import Xpbd
 from .stepping import advance
 from .world import World
 
@@ -70,6 +71,7 @@ __all__ = [
     "UserForce",
     "World",
     "WorstFirst",
+    "Xpbd",
     "advance",
     "draw",
     "flight",

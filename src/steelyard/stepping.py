@@ -25,6 +25,7 @@ from .model.tape import (
     H_POSITION,
     H_RECIPE,
     H_STATE_ROWS,
+    H_SUBSTEPS,
     H_TIME,
     H_VELOCITY,
     HASTY,
@@ -214,8 +215,9 @@ def advance(launch, substeps):
 
     Args:
         launch: (n,) int64.
-        substeps: number of steps.
+        substeps: number of steps; a solver that divides the step takes its own within each.
     """
     blocks = (launch[L_WORLDS] + LANES - 1) // LANES
     pointer = integers_at(launch.ctypes.data)
-    _call_advance(launch[L_ADVANCE], pointer, 0, blocks, substeps, WHOLE_STEP)
+    count = substeps * tape_at(launch[L_TAPE])[H_SUBSTEPS]
+    _call_advance(launch[L_ADVANCE], pointer, 0, blocks, count, WHOLE_STEP)

@@ -66,7 +66,7 @@ class Stiffness:
         self.reference = dict.fromkeys(range(self.count), c.zero)
         c.header["right"] = c.take(3 * self.count)
         self.spare = c.take(9)
-        c.header["reach"] = c.constant(c.method.integrator.reach * c.method.dt)
+        c.header["reach"] = c.constant(c.method.integrator.reach * c.method.substep)
         c.header["mass"] = c.slot(
             len(c.particles),
             ((PARTICLES, "inverse_mass"),),
@@ -96,7 +96,7 @@ class Stiffness:
             for p in ends:
                 if p is not None:
                     touching[p] += 1.0
-        square = 4.0 * (c.method.integrator.reach * c.method.dt) ** 2
+        square = 4.0 * (c.method.integrator.reach * c.method.substep) ** 2
         records: list[int] = []
         for a, b in c.spring_ends:
             some = [p for p in (a, b) if p is not None]

@@ -88,12 +88,15 @@ from __future__ import annotations
     H_DRAG_BLOCKS,
     H_FLOAT_BLOCKS,
     H_PROPAGATORS,
-) = range(79)
-HEADER = 79
+    H_SUBSTEPS,
+    H_COMPLIANCES,
+) = range(81)
+HEADER = 81
 
-# Width of the records of links and contacts; ``model.compile`` writes them field by field.
+# Width of the records of links, contacts and springs that a solver holds; written field by field.
 LINK = 17
 CONTACT = 24
+COMPLIANCE = 10
 
 # Records of clusters and of loads on them: what comes before their lists, and an entry of a cluster's. Work rows of a
 # cluster: inertia, inverse of that with loads, quaternion (angular velocity in the velocity stage), shift of the centre
