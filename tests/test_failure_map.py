@@ -20,7 +20,7 @@ def test_search_finds_the_first_loss_and_the_next_gain() -> None:
         return (x <= edges[:, :1]) | (x > edges[:, 1:])
 
     grid = np.geomspace(0.1, 10.0, 12)
-    lost, regained = first_loss(holds, 5, grid, rounds=5)
+    lost, regained = first_loss(holds, 5, grid, rounds=5, points=10)
     # Each round divides the bracket, a factor 1.52, by 11.
     np.testing.assert_allclose(lost, edges[:, 0], rtol=1.52 / 11**5)
     np.testing.assert_allclose(regained, edges[:, 1], rtol=1.52 / 11**5)

@@ -222,7 +222,9 @@ def measure(
     lost, regained = [], []
     for dt in steps:
         bench = SpringBench(case, dt, ratios, len(phases))
-        low, high = first_loss(bench.holds, len(ratios), phases, rounds=2 if quick else 4)
+        low, high = first_loss(
+            bench.holds, len(ratios), phases, rounds=2 if quick else 4, points=len(phases)
+        )
         lost.append(low)
         regained.append(high)
     return {

@@ -11,10 +11,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.linalg import eigh, eigvalsh
+from scipy.linalg import eigvalsh
 
 import steelyard as sy
-from benchmarks.failure_map import springs
+from benchmarks.failure_map import chains, iterations, springs
+from benchmarks.failure_map.iterations import left_after, sweep_share
 from benchmarks.failure_map.springs import CASES, SpringBench, SpringCase
 from tests.engine.spring_worlds import Array, spring_world, states
 
@@ -190,39 +191,12 @@ def test_rattle_holds_a_loaded_chain_up_to_its_geometric_stiffness(
 # Sweeps
 
 
-def sweep_rate(links: int, ratio: float) -> float:
-    """Share of the error that a sweep leaves on a straight chain: the square of the Jacobi matrix's radius.
-
-    J M^-1 J^T of a chain that hangs from a point is tridiagonal, so the sweeps are consistently
-    ordered (Young 1954) and their radius is the square of that of D^-1 (L + U).
-    """
-    inverse = np.append(np.ones(links - 1), 1.0 / ratio)
-    diagonal = inverse + np.append(0.0, inverse[:-1])
-    matrix = np.diag(diagonal) - np.diag(inverse[:-1], 1) - np.diag(inverse[:-1], -1)
-    scale = 1.0 / np.sqrt(diagonal)
-    jacobi = np.eye(links) - scale[:, None] * matrix * scale
-    return float(np.abs(eigh(jacobi, eigvals_only=True)).max()) ** 2
-
-
-def left_after(links: int, ratio: float, passes: int) -> float:
-    """Norm of the strains after so many sweeps on a straight chain that is pulled along."""
-    scene = hanging_chain(links, ratio)
-    method = sy.Method(sy.SymplecticEuler(), sy.GaussSeidel(passes=passes), dt=0.01)
-    world = sy.World(scene, method=method)
-    world.gravity = (0.0, 0.0, 0.0)
-    # Strains of 1e-7: what is quadratic in them does not show.
-    speed = 1e-6 * np.random.default_rng(5).standard_normal(links)
-    world.particles.velocity[0, :, 1] = speed
-    world.step()
-    return float(np.linalg.norm(world.residual))
-
-
 @pytest.mark.parametrize("links", [4, 10, 20])
 def test_sweeps_leave_the_share_that_theory_says(links: int) -> None:
     # Equal masses: the Jacobi matrix of such a chain is that of the Chebyshev polynomials (its first coupling is
     # 1/sqrt 2, all others 1/2), whose eigenvalues are cos((2k - 1) pi / 2n).
     rate = math.cos(math.pi / (2 * links)) ** 2
-    assert sweep_rate(links, 1.0) == pytest.approx(rate, rel=1e-12)
+    assert sweep_share(links, 1.0) == pytest.approx(rate, rel=1e-12)
     # The next mode must have died out: its share is cos^2(3 pi / 2n).
     first = 2 * links**2 // 3
     found = (left_after(links, 1.0, 2 * first) / left_after(links, 1.0, first)) ** (1.0 / first)
@@ -236,8 +210,60 @@ def test_sweeps_leave_the_share_that_theory_says(links: int) -> None:
 def test_a_heavy_end_slows_the_sweeps(links: int, ratio: float) -> None:
     # Moving the whole chain strains only the anchor's rod: 1 A 1 = 1/r against 1 D 1 = 2 (n - 1) + 1/r, so the Jacobi
     # matrix's radius is 1 - 1/(2 r (n - 1)) and the sweeps leave 1 - 1/(r (n - 1)): 2.3 r (n - 1) for a digit.
-    digit = -math.log(10.0) / math.log(sweep_rate(links, ratio))
+    digit = -math.log(10.0) / math.log(sweep_share(links, ratio))
     assert digit == pytest.approx(math.log(10.0) * ratio * (links - 1), rel=0.4 / ratio * links)
     first = round(digit / 4)
     found = (left_after(links, ratio, 3 * first) / left_after(links, ratio, first)) ** (0.5 / first)
-    assert -math.log(found) == pytest.approx(-math.log(sweep_rate(links, ratio)), rel=1e-3)
+    assert -math.log(found) == pytest.approx(-math.log(sweep_share(links, ratio)), rel=1e-3)
+
+
+def gained(links: int, passes: int, step: float) -> float:
+    """Most energy over that of the start, over M g L, while a level chain swings across by RATTLE's sweeps."""
+    world = sy.World(
+        chains.chain(links),
+        method=sy.Method(sy.Rattle(), sy.GaussSeidel(passes=passes), dt=step * chains.TAU),
+    )
+    start, most = float(world.energy[0]), -math.inf
+    count = math.ceil(chains.HALF_SWING * math.sqrt(links) / step)
+    for _ in range(200):
+        world.step(max(1, count // 200))
+        most = max(most, float(world.energy[0]) - start)
+    return most / (links * chains.GRAVITY * links * chains.LENGTH)
+
+
+@pytest.mark.parametrize(("links", "few", "enough"), [(12, 10, 20), (20, 30, 40)])
+def test_too_few_sweeps_pump_energy(links: int, few: int, enough: int) -> None:
+    # Position sweeps start from the last step's multipliers, velocity sweeps from none: what they leave adds up, and
+    # smaller steps only make it worse. No theory: the numbers of sweeps are as found.
+    assert gained(links, few, 1 / 512) > 0.5
+    assert abs(gained(links, enough, 1 / 512)) < 1e-4
+
+
+def test_worst_first_stops_getting_better() -> None:
+    # It resolves along directions of the step's start, so what is quadratic in the step is left however often it
+    # goes round; sweeps go on to rounding.
+    def left(solver: object, dt: float = iterations.DT) -> float:
+        return iterations.swing(sy.SymplecticEuler(), solver, dt=dt)[0]
+
+    few, some, many = (left(sy.WorstFirst(iterations=5 * count)) for count in (1, 64, 4096))
+    assert few > 50.0 * some
+    assert many == pytest.approx(some, rel=1e-3)
+    assert some > 1e-3
+    assert left(sy.GaussSeidel(passes=256)) < 1e-11
+    # A quarter of the step leaves about a sixteenth.
+    fine = left(sy.WorstFirst(iterations=5 * 512), iterations.DT / 4)
+    assert 8.0 < some / fine < 32.0
+
+
+# XPBD
+
+
+@pytest.mark.parametrize("links", [5, 12])
+def test_xpbd_holds_a_swinging_load_up_to_what_one_pass_leaves(links: int) -> None:
+    # A rod is right after its turn, and the next one then pulls its end by h^2 T / m: a stretch of h^2 T / (m l) with T
+    # = 3 M g at the lowest point. The whole swing adds some per cent, so the sides are 20 % apart.
+    (case,) = (case for case in chains.CASES if case.name == "XPBD, 20 substeps")
+    limit = chains.left_by_one_pass(20)(links, 1e4)
+    bench = chains.ChainBench(case, links, np.array([1e4, 1e4]))
+    within, beyond = bench.holds(limit * np.array([[0.9], [1.1]]))[:, 0]
+    assert within and not beyond

@@ -88,6 +88,24 @@ def swung_by(substeps: int, iterations: int) -> sy.World:
     return world
 
 
+def test_what_one_pass_leaves_of_a_hanging_load() -> None:
+    # At rest a substep's fall h^2 g is undone by pulls that balance: rod k pulls by h^2 g times the mass below it. It
+    # is right after its turn; then the next one pulls its end down by h^2 g (mass below that end) / (its mass).
+    masses = [1.0, 2.0, 0.5, 4.0]
+    scene = sy.Scene()
+    row = [
+        scene.add(sy.Particle(position=(0, -0.5 * (k + 1), 0), mass=m, damping=1e-4))
+        for k, m in enumerate(masses)
+    ]
+    scene.add(sy.RodConstraint(row[0], (0, 0, 0)))
+    for a, b in pairwise(row):
+        scene.add(sy.Rod(a, b))
+    world = sy.World(scene, method=small_steps(1 / 60, 10))
+    world.step(3000)
+    left = [9.81 / 600**2 * sum(masses[k + 1 :]) / m for k, m in enumerate(masses)]
+    np.testing.assert_allclose(0.5 * world.residual[0], left, rtol=0, atol=1e-12)
+
+
 def test_more_passes_leave_less_and_more_substeps_still_less() -> None:
     left = [
         np.abs(swung_by(substeps, iterations).residual).max()

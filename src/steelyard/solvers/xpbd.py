@@ -13,8 +13,8 @@ displacement of the substep; what rebounds, cables too, is set right in the velo
 Order 1, in the substep. Conserves linear momentum; damps like backward Euler: a single spring keeps (1 + h^2
 w^2)^(-1/2) of its amplitude at each substep, whatever its stiffness, and what turns loses angular momentum. No spring
 has a stability limit; other forces have that of symplectic Euler in h. One pass does not settle constraints that
-share particles: what is left falls as h^2, also of a structure at rest, and grows with the square of a
-chain's links and with its mass ratio. Works with symplectic Euler alone, whose step predicts the substep.
+share particles: a rod of a chain is right after its turn, and the next one's pull T stretches it again by h^2 T / m, m
+the mass between them, at rest too. Works with symplectic Euler alone, whose step predicts the substep.
 
 Sources: Macklin, Mueller & Chentanez 2016, *XPBD* (eq. 18); Macklin et al. 2019, *Small steps in physics simulation*;
 Mueller et al. 2020, *Detailed rigid body simulation with extended position based dynamics* (contacts).
