@@ -12,7 +12,7 @@ STAMP := $(VENV)/.installed
 PYTEST := $(BIN)/python -m pytest -q -n 2 --dist loadfile
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-all lint bench charts clean
+.PHONY: help setup demo test test-all lint bench charts failure-map clean
 
 help: ## Show this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1\t\2/p' $(firstword $(MAKEFILE_LIST)) | expand -t 18
@@ -40,6 +40,9 @@ charts: $(STAMP) ## Chart cost against error on all reference problems
 
 bench: $(STAMP) ## Measure speed and accuracy against the peers
 	$(BIN)/python -m benchmarks.run
+
+failure-map: $(STAMP) ## Draw where methods fail, against the theory
+	$(BIN)/python -m benchmarks.failure_map
 
 clean: ## Remove the virtual environment, caches and compiled kernels
 	rm -rf $(VENV) build dist .hypothesis .import_linter_cache .mypy_cache .pytest_cache .ruff_cache

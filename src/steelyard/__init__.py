@@ -36,6 +36,7 @@ from .scene.scene import Scene
 from .solvers.direct import Direct
 from .solvers.gauss_seidel import GaussSeidel
 from .solvers.worst_first import WorstFirst
+from .solvers.xpbd import Xpbd
 from .stepping import advance
 from .world import World
 
@@ -79,6 +80,7 @@ __all__ = [
     "UserForce",
     "World",
     "WorstFirst",
+    "Xpbd",
     "advance",
     "candidates",
     "choose_method",

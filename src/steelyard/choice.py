@@ -39,6 +39,7 @@ from .solvers.base import Solver
 from .solvers.direct import Direct
 from .solvers.gauss_seidel import GaussSeidel
 from .solvers.worst_first import WorstFirst
+from .solvers.xpbd import Xpbd
 
 if TYPE_CHECKING:
     from .world import World
@@ -84,6 +85,7 @@ CANDIDATES = (
     Candidate("RATTLE, Gauss-Seidel x 16", Rattle(), GaussSeidel(passes=16)),
     Candidate("RATTLE, Gauss-Seidel x 64", Rattle(), GaussSeidel(passes=64)),
     Candidate("symplectic Euler, direct", SymplecticEuler(), Direct()),
+    Candidate("XPBD x 20", SymplecticEuler(), Xpbd(substeps=20)),
     Candidate("explicit Euler, worst first", ExplicitEuler(), WorstFirst()),
 )
 

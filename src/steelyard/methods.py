@@ -19,6 +19,7 @@ from .solvers.base import Solver
 from .solvers.direct import Direct
 from .solvers.gauss_seidel import GaussSeidel
 from .solvers.worst_first import WorstFirst
+from .solvers.xpbd import Xpbd
 
 _STEP = checks.Limit(above=0.0, remedy="Use 1/60 for sixty steps a second.")
 _TOLERANCE = checks.Limit(above=0.0, remedy="Use 1e-12 for what rounding allows.")
@@ -50,10 +51,22 @@ class Method:
             checks.instance("Method", "solver", self.solver, Solver, remedy="Use Direct().")
         for part in (self.integrator, self.solver):
             owner = type(part).__name__
-            for name, least in (("passes", 1), ("iterations", 0)):
+            least_iterations = 1 if isinstance(part, Xpbd) else 0
+            for name, least in (("passes", 1), ("iterations", least_iterations), ("substeps", 1)):
                 count = getattr(part, name, least)
                 checks.whole(owner, name, count, least=least, remedy="Give a count.")
             checks.number(owner, "tolerance", getattr(part, "tolerance", 1.0), _TOLERANCE)
+
+    @property
+    def substeps(self) -> int:
+        """Parts into which the solver divides a step."""
+        count: int = getattr(self.solver, "substeps", 1)
+        return count
+
+    @property
+    def substep(self) -> float:
+        """What the stages take for a step [s]: dt over ``substeps``."""
+        return self.dt / self.substeps
 
     def refuse(self, scene: Scene) -> None:
         """Raise if this method cannot do what a scene holds.
@@ -95,6 +108,11 @@ class Method:
             raise ValueError(
                 f"{name} does not work with {type(self.solver).__name__}. "
                 f"Use {self._fitting(self.integrator)} with it."
+            )
+        if isinstance(self.solver, Xpbd) and not isinstance(self.integrator, SymplecticEuler):
+            raise ValueError(
+                f"{name} does not work with Xpbd, which takes velocities from the displacement of a whole "
+                "substep. Use SymplecticEuler() with it."
             )
         if isinstance(self.solver, WorstFirst) and scene.of(Rider):
             raise ValueError(
@@ -165,4 +183,5 @@ __all__ = [
     "RungeKutta4",
     "SymplecticEuler",
     "WorstFirst",
+    "Xpbd",
 ]

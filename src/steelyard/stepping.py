@@ -17,6 +17,7 @@ from .math.pointers import LANES, Integers, doubles_at, integers_at, tape_at
 from .model.tape import (
     FRESH,
     H_BLOCKS,
+    H_DIVISIONS,
     H_DT,
     H_GIVEN_UP,
     H_HASTY,
@@ -222,8 +223,9 @@ def advance(launch, substeps):
 
     Args:
         launch: (n,) int64.
-        substeps: number of steps.
+        substeps: number of steps; a solver that divides the step takes its own within each.
     """
     blocks = (launch[L_WORLDS] + LANES - 1) // LANES
     pointer = integers_at(launch.ctypes.data)
-    _call_advance(launch[L_ADVANCE], pointer, 0, blocks, substeps, WHOLE_STEP)
+    count = substeps * tape_at(launch[L_TAPE])[H_DIVISIONS]
+    _call_advance(launch[L_ADVANCE], pointer, 0, blocks, count, WHOLE_STEP)

@@ -134,6 +134,7 @@ class World:
             steps = checks.whole("World.step", "steps", steps, least=0, remedy="Give a count.")
         if self._stale:
             self._prepare()
+        steps *= self.method.substeps
         if self._split:
             for _ in range(steps):
                 self._step_split()
@@ -165,7 +166,7 @@ class World:
         shares = self.method.integrator.evaluations if written else (None,)
         for part, share in enumerate(shares):
             if share is not None:
-                evaluate_forces(self, share * self.method.dt)
+                evaluate_forces(self, share * self.method.substep)
             self._run(1, 1 << part if part < len(shares) - 1 else WHOLE_STEP << part)
 
     # Access

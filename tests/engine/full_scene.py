@@ -14,6 +14,7 @@ METHODS = {
     "rattle gauss-seidel": sy.Method(sy.Rattle(), sy.GaussSeidel()),
     "symplectic direct": sy.Method(sy.SymplecticEuler(), sy.Direct()),
     "symplectic gauss-seidel": sy.Method(sy.SymplecticEuler(), sy.GaussSeidel()),
+    "symplectic xpbd": sy.Method(sy.SymplecticEuler(), sy.Xpbd(substeps=4)),
     "symplectic worst-first": sy.Method(sy.SymplecticEuler(), sy.WorstFirst()),
     "explicit worst-first": sy.Method(sy.ExplicitEuler(), sy.WorstFirst()),
 }

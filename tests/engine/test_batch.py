@@ -313,6 +313,7 @@ def test_any_number_of_threads(scene: str, name: str, threads: int) -> None:
         ("net", "SymplecticEuler-Direct"),
         ("falling platform", "Rattle-GaussSeidel"),
         ("landing bridge", "ExplicitEuler-WorstFirst"),
+        ("ridden platform", "SymplecticEuler-Xpbd"),
     ],
 )
 def test_any_number_of_worlds_and_any_row(scene: str, name: str, worlds: int) -> None:

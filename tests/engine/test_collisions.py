@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import steelyard as sy
-from tests.engine.builders import METHODS, STAGED, Array, method
+from tests.engine.builders import METHODS, STAGED, Array, method, undivided
 
 G = 9.81
 
@@ -26,7 +26,7 @@ def collision(name: str, restitution: float, friction: float = 0.0) -> tuple[Arr
     a = scene.add(sy.Particle(position=(-0.5, 0.02, 0.0), velocity=(2.0, 0.0, 0.0), mass=1.0))
     b = scene.add(sy.Particle(position=(0.5, 0.0, 0.0), velocity=(-1.0, 0.3, 0.1), mass=3.0))
     scene.add(sy.ContactGenerator(spheres, [(a, b)], restitution=restitution, friction=friction))
-    world = sy.World(scene, method=method(name, dt=1 / 120))
+    world = sy.World(scene, method=undivided(name, dt=1 / 120))
     before = world.particles.velocity[0].copy()
     for _ in range(120):
         apart = np.subtract(*world.particles.position[0])

@@ -1,4 +1,4 @@
-"""The discrete motion of a spring: amplification, stability limits, energy and phase."""
+"""The discrete motion of a spring: amplification, energy and phase."""
 
 from __future__ import annotations
 
@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 import steelyard as sy
-
-Array = np.ndarray
+from tests.engine.spring_worlds import Array, spring_world, states
 
 STEPPING = [sy.ExplicitEuler(), sy.SymplecticEuler(), sy.Rattle()]
 SPLITTING = [sy.SymplecticEuler(), sy.Rattle()]
@@ -37,31 +36,6 @@ def amplification(integrator: Any, h: float, square: float, damping: float) -> A
     return damp @ kick @ drift @ kick @ damp
 
 
-def spring_world(
-    integrator: Any,
-    square: Any,
-    *,
-    dt: float = 1.0 / 60.0,
-    damping: float = 1.0,
-    start: Any = ((1.0, 0.0),),
-) -> sy.World:
-    """Springs of rest length 0 in one world per start (x, v) and value of k/m."""
-    square, start = np.atleast_1d(square), np.asarray(start)
-    worlds = max(len(square), len(start))
-    scene = sy.Scene(gravity=(0, 0, 0))
-    p = scene.add(sy.Particle(position=(0, 0, 0), mass=2.0, damping=damping))
-    spring = scene.add(sy.AnchoredSpring(p, (0, 0, 0), 1.0, 0.0))
-    world = sy.World(scene, worlds=worlds, method=sy.Method(integrator, dt=dt))
-    world[spring].stiffness = np.broadcast_to(2.0 * square, (worlds,))
-    world.particles.position[:, 0, 0], world.particles.velocity[:, 0, 0] = start.T
-    return world
-
-
-def states(world: sy.World) -> Array:
-    """(x, v) of every world, shape (worlds, 2)."""
-    return np.stack([world.particles.position[:, 0, 0], world.particles.velocity[:, 0, 0]], axis=1)
-
-
 @pytest.mark.parametrize("damping", [1.0, 0.9, 0.01])
 @_over(STEPPING)
 def test_a_spring_moves_as_its_amplification_matrix_says(integrator: Any, damping: float) -> None:
@@ -83,38 +57,6 @@ def test_a_spring_moves_as_its_amplification_matrix_says(integrator: Any, dampin
         assert error < 1e-11 * largest
 
 
-@_over(SPLITTING)
-def test_stability_limit_from_both_sides(integrator: Any) -> None:
-    h = 1.0 / 60.0
-    limit = integrator.stable_limit()
-    assert limit == 2.0
-    inside, outside = 0.995 * limit, 1.005 * limit
-    world = spring_world(integrator, (np.array([inside, outside]) / h) ** 2)
-    # Inside: Verlet's x is cos(n theta); symplectic Euler keeps v^2 + w^2 x^2 - h w^2 x v, an
-    # ellipse that reaches 1 / sqrt(1 - (h w / 2)^2).
-    reach = 1.0 if isinstance(integrator, sy.Rattle) else (1.0 - (inside / 2.0) ** 2) ** -0.5
-    largest = 0.0
-    for _ in range(100):
-        world.step(7)
-        largest = max(largest, abs(world.particles.position[0, 0, 0]))
-    assert 0.99 * reach < largest < (1.0 + 1e-9) * reach
-    # Outside: growth by e^mu a step with cosh(mu) = (h w)^2 / 2 - 1.
-    assert abs(world.particles.position[1, 0, 0]) > math.cosh(
-        700 * math.acosh(outside**2 / 2.0 - 1.0) - 1.0
-    )
-
-
-def test_stability_limit_of_damped_symplectic_euler() -> None:
-    # The trace 1 + q - (h w)^2 leaves the stable triangle where (h w)^2 = 2 (1 + q), q = d^h.
-    h, damping = 1.0 / 60.0, 0.01
-    limit = math.sqrt(2.0 * (1.0 + damping**h))
-    squares = (np.array([0.995, 1.005]) * limit / h) ** 2
-    world = spring_world(sy.SymplecticEuler(), squares, damping=damping)
-    world.step(2000)
-    assert abs(world.particles.position[0, 0, 0]) < 1e-6
-    assert abs(world.particles.position[1, 0, 0]) > 1e6
-
-
 def test_explicit_euler_gains_energy_at_every_step() -> None:
     # |lambda|^2 = 1 + (h w)^2, whatever the phase: at 60 Hz, 1 Hz has 695 times its energy in 10 s.
     integrator, h = sy.ExplicitEuler(), 1.0 / 60.0
@@ -126,23 +68,6 @@ def test_explicit_euler_gains_energy_at_every_step() -> None:
     gain = (1.0 + phases**2) ** 600
     np.testing.assert_allclose(world.energy / start, gain, rtol=600 * 1e-15)
     assert 690.0 < gain[1] < 700.0
-
-
-@pytest.mark.parametrize(("ratio", "stable"), [(6.32, True), (6.34, False)])
-def test_damped_explicit_euler_is_stable_up_to_its_limit(ratio: float, stable: bool) -> None:
-    # The area spanned by two solutions changes by the determinant d^h (1 + h^2 k/m) at each step,
-    # and both eigenvalues have its root as modulus: stable iff k/m < (d^-h - 1) / h^2 = 6.327.
-    h, damping, steps = 1.0 / 60.0, 0.9, 36_000
-    limit = (damping**-h - 1.0) / h**2
-    assert limit == pytest.approx(6.33, abs=0.005)
-    assert (ratio < limit) == stable
-    world = spring_world(sy.ExplicitEuler(), ratio, damping=damping, start=((1, 0), (0, 1)))
-    world.step(steps)
-    area = np.linalg.det(states(world))
-    assert area == pytest.approx((damping**h * (1.0 + h * h * ratio)) ** steps, rel=1e-10)
-    assert (area < 1.0) == stable
-    # A hundredth of k/m is 2.8e-6 a step: 10 % over the run.
-    assert abs(math.log(area)) > 0.05
 
 
 def test_verlet_holds_the_energy_of_a_spring_for_1000_periods() -> None:

@@ -44,8 +44,10 @@ def test_methods_made_of_the_wrong_parts() -> None:
         lambda bad: sy.GaussSeidel(passes=bad),
         lambda bad: sy.Direct(passes=bad),
         lambda bad: sy.WorstFirst(iterations=bad),
+        lambda bad: sy.Xpbd(iterations=bad),
+        lambda bad: sy.Xpbd(substeps=bad),
     ],
-    ids=["GaussSeidel", "Direct", "WorstFirst"],
+    ids=["GaussSeidel", "Direct", "WorstFirst", "Xpbd", "Xpbd substeps"],
 )
 @pytest.mark.parametrize("bad", [-1, 2.5, NAN, INF, "x"], ids=str)
 def test_passes_are_a_whole_number(solver: Callable[..., Any], bad: Any) -> None:
@@ -82,14 +84,19 @@ UNFIT = [
     (sy.ClosedForm(), sy.Direct()),
     (sy.ClosedForm(), sy.GaussSeidel()),
     (sy.ClosedForm(), sy.WorstFirst()),
-    *((i, s) for i in SMOOTH for s in (None, sy.Direct(), sy.GaussSeidel(), sy.WorstFirst())),
-    *((sy.GeneralisedAlpha(), s) for s in (sy.Direct(), sy.GaussSeidel(), sy.WorstFirst())),
+    *(
+        (i, sy.Xpbd())
+        for i in (sy.ExplicitEuler(), sy.Rattle(), sy.ClosedForm(), sy.ComposedRattle())
+    ),
+    *((i, s) for i in SMOOTH for s in (None, *STAGED, sy.WorstFirst(), sy.Xpbd())),
+    *((sy.GeneralisedAlpha(), s) for s in (*STAGED, sy.WorstFirst(), sy.Xpbd())),
 ]
 FIT = [
     (sy.ExplicitEuler(), sy.WorstFirst()),
     (sy.SymplecticEuler(), sy.WorstFirst()),
     (sy.SymplecticEuler(), sy.Direct()),
     (sy.SymplecticEuler(), sy.GaussSeidel()),
+    (sy.SymplecticEuler(), sy.Xpbd()),
     (sy.Rattle(), sy.Direct()),
     (sy.Rattle(), sy.GaussSeidel()),
     (sy.ComposedRattle(), sy.Direct()),
@@ -105,7 +112,7 @@ def test_every_combination_is_either_fit_or_unfit() -> None:
     integrators = [sy.ExplicitEuler, sy.SymplecticEuler, sy.Rattle, sy.ClosedForm]
     integrators += [*map(type, SMOOTH), sy.ComposedRattle]
     integrators.append(sy.GeneralisedAlpha)
-    solvers = [type(None), sy.WorstFirst, sy.Direct, sy.GaussSeidel]
+    solvers = [type(None), sy.WorstFirst, sy.Direct, sy.GaussSeidel, sy.Xpbd]
     tried = [(type(i), type(s)) for i, s in UNFIT + FIT]
     tried.append((sy.GeneralisedAlpha, type(None)))  # takes links, no contacts
     assert sorted(map(str, tried)) == sorted(str((i, s)) for i in integrators for s in solvers)

@@ -22,6 +22,7 @@ from ..scene.particle import Particle
 from ..scene.rider import Rider
 from ..scene.scene import CONTACTS, LINKS, Scene
 from . import derived, tape
+from .compliances import add_compliances
 from .constraints import add_contacts, add_links, add_riders
 from .forces import add_forces
 from .network import Network
@@ -29,7 +30,7 @@ from .parameters import PARTICLES, Key, Parameters, Slot
 from .propagators import add_propagators
 from .saddle import Saddle
 from .stiffness import Stiffness
-from .tape import CONTACT, HEADER, LINK
+from .tape import COMPLIANCE, CONTACT, HEADER, LINK
 
 #: Header fields that are -1, not an empty section, where a scene has no such rows.
 _ABSENT = ("user_forces", "force", "start", "free", "impulse", "dense")
@@ -96,7 +97,7 @@ class Compiler:
             "springs": 7, "gravities": 3, "buoyancies": 5, "drags": 7, "stiff_springs": 8, "drift": 1,
             "winches": 3, "movers": 5, "links": LINK, "contacts": CONTACT, "generators": 2,
             "recipe": 2, "unknowns": 4, "spring_blocks": 4, "drag_blocks": 1, "float_blocks": 1,
-            "propagators": 2,
+            "propagators": 2, "compliances": COMPLIANCE,
         }  # fmt: skip
         self.next_row = 0
         self.start: list[float] = []
@@ -107,6 +108,8 @@ class Compiler:
         self.staged = integrator.holds_links or (solver is not None and solver.staged)
         self.network = Network(self) if solver is not None and solver.sparse else None
         self.saddle = Saddle(self) if integrator.holds_links else None
+        #: Whether springs are constraints of the solver.
+        self.compliant = solver is not None and solver.compliant
         if self.network is not None:
             self.links = self.network.choose()
         if self.saddle is not None:
@@ -201,6 +204,7 @@ class Compiler:
         self._particles()
         add_forces(self)
         add_links(self)
+        add_compliances(self)
         add_riders(self)
         add_contacts(self)
         self._method()
@@ -275,12 +279,12 @@ class Compiler:
             ((PARTICLES, "acceleration"),),
             lambda value: value * (movable if value.ndim == 1 else movable[:, None]),
         )
-        share = method.integrator.damping_share * method.dt
+        share = method.integrator.damping_share * method.substep
         damping_key = (PARTICLES, "damping")
         if method.integrator.flies:
 
             def phis(value: np.ndarray) -> np.ndarray:
-                return np.moveaxis(derived.flight(value, method.dt), 0, 1).reshape(
+                return np.moveaxis(derived.flight(value, method.substep), 0, 1).reshape(
                     3 * count, *value.shape[1:]
                 )
 
@@ -297,7 +301,8 @@ class Compiler:
         flows = [] if method.integrator.smooth else self.scene.of(StiffSpring)
         stiff = {id(spring.particle) for spring in flows}
         self.sections["drift"] = [p for p, x in enumerate(self.particles) if id(x) not in stiff]
-        self.header["dt"] = self.constant(method.dt)
+        self.header["dt"] = self.constant(method.substep)
+        self.header["divisions"] = method.substeps
         self._substeps()
 
     def _substeps(self) -> None:

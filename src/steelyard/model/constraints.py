@@ -15,6 +15,7 @@ from ..scene.contacts import (
 )
 from ..scene.links import CableConstraint, RodConstraint
 from ..scene.rider import Rider
+from .compliances import springs_of
 from .parameters import PARTICLES
 from .tape import CONTACT, GROUND, LINE, USER
 
@@ -25,7 +26,8 @@ if TYPE_CHECKING:
 def add_links(c: Compiler) -> None:
     """Work rows of constrained particles and a record per link."""
     count = len(c.particles)
-    constrained = bool(c.links or c.implied or c.scene.of(Rider) or c.contacts)
+    held = c.compliant and springs_of(c.scene)
+    constrained = bool(c.links or c.implied or c.scene.of(Rider) or c.contacts or held)
     c.header["constrained"] = int(constrained)
     staged = constrained and c.staged
     for name in ("start", "free"):

@@ -14,12 +14,12 @@ from ..scene.forces import (
     Buoyancy,
     Drag,
     Gravity,
-    Spring,
     StiffSpring,
     UserForce,
 )
 from ..scene.particle import Particle
 from . import derived
+from .compliances import springs_of
 from .parameters import PARTICLES
 
 if TYPE_CHECKING:
@@ -39,8 +39,11 @@ def add_forces(c: Compiler) -> None:
     drags = scene.of(Drag)
     integrator = c.method.integrator
     stiff_springs = scene.of(StiffSpring)
+    # Springs that the solver holds are no forces.
+    summed_springs = [] if c.compliant else springs_of(scene)
     summed = (
-        scene.of(Spring, Bungee, AnchoredSpring, AnchoredBungee, Gravity, Buoyancy, UserForce)
+        summed_springs
+        or scene.of(Gravity, Buoyancy, UserForce)
         or (drags and integrator.sums_drag)
         or (stiff_springs and integrator.smooth and not integrator.linear)
     )
@@ -49,7 +52,7 @@ def add_forces(c: Compiler) -> None:
     c.header["force"] = force
     spare = force + 3 * len(c.particles)
     springs: list[int] = []
-    for spring in scene.of(Spring, Bungee, AnchoredSpring, AnchoredBungee):
+    for spring in summed_springs:
         stiffness = c.parameter(spring, "stiffness", spring.stiffness)
         rest = c.parameter(spring, "rest_length", spring.rest_length)
         if isinstance(spring, AnchoredSpring):
@@ -98,7 +101,7 @@ def add_forces(c: Compiler) -> None:
         p = float_.particle
         y, f = c.at("position", p) + 1, c.at("force", p) + 1
         c.sections["buoyancies"] += [y, f, surface, half, lift]
-    share = integrator.damping_share * c.method.dt
+    share = integrator.damping_share * c.method.substep
     c.sections["drags"] = []
     for drag in drags:
         linear = c.parameter(drag, "linear", drag.linear)
@@ -149,7 +152,7 @@ def _plain_spring(c: Compiler, spring: StiffSpring, spare: int) -> None:
 
 def _stiff_spring(c: Compiler, spring: StiffSpring) -> None:
     i = c.of(spring.particle)
-    dt = c.method.dt
+    dt = c.method.substep
     anchor = c.parameter(spring, "anchor", spring.anchor)
     c.parameters.declare((spring, "stiffness"), spring.stiffness)
     c.parameters.declare((spring, "damping"), spring.damping)

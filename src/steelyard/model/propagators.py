@@ -35,7 +35,7 @@ def add_propagators(c: Compiler) -> None:
             own = inverse[p : p + 1]
             square = _sum(given[:count]) * own
             rate = derived.rate(damping[p : p + 1]) + _sum(given[count:]) * own
-            return exponential_weights(square, rate, c.method.dt)[:, 0]
+            return exponential_weights(square, rate, c.method.substep)[:, 0]
 
         centre = c.zero
         if springs:

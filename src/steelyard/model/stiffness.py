@@ -75,7 +75,7 @@ class Stiffness:
         """Rows that no unknown has, masses, and how far the method reaches."""
         c = self.c
         self.spare = c.take(9)
-        c.header["reach"] = c.constant(c.method.integrator.reach * c.method.dt)
+        c.header["reach"] = c.constant(c.method.integrator.reach * c.method.substep)
         c.header["mass"] = c.slot(
             len(c.particles),
             ((PARTICLES, "inverse_mass"),),

@@ -97,13 +97,16 @@ from __future__ import annotations
     H_SADDLE_SOLVE,
     H_SADDLE_LINKS,
     H_SADDLE_RIDERS,
-) = range(88)
-HEADER = 88
+    H_DIVISIONS,
+    H_COMPLIANCES,
+) = range(90)
+HEADER = 90
 
-# Width of the records of links and contacts; ``model.compile`` writes them field by field.
+# Width of the records of links, contacts and springs that a solver holds; written field by field.
 LINK = 17
 CONTACT = 24
 SADDLE_LINK = 10
+COMPLIANCE = 10
 
 # Records of clusters and of loads on them: what comes before their lists, and an entry of a cluster's. Work rows of a
 # cluster: inertia, inverse of that with loads, quaternion (angular velocity in the velocity stage), shift of the centre

@@ -101,7 +101,7 @@ def _sweep_links(tape, s, velocity):
 
 
 @inner
-def _sweep_riders(tape, s, velocity):
+def sweep_riders(tape, s, velocity):
     """One sweep over the riders."""
     zero = splat(0.0)
     at = tape[H_RIDERS] + 1
@@ -129,7 +129,7 @@ def _sweep_riders(tape, s, velocity):
 
 
 @inner
-def _sweep_contacts(tape, s, skip, velocity):
+def sweep_contacts(tape, s, skip, velocity):
     """One sweep over the contacts: normal, then tangents within the friction cone."""
     zero = splat(0.0)
     one = splat(1.0)
@@ -200,7 +200,7 @@ def sweep_stage(tape, s, skip, half):
     gather(tape, s, skip, velocity, target)
     for _ in range(tape[H_PASSES]):
         _sweep_links(tape, s, velocity)
-        _sweep_riders(tape, s, velocity)
-        _sweep_contacts(tape, s, skip, velocity)
+        sweep_riders(tape, s, velocity)
+        sweep_contacts(tape, s, skip, velocity)
     gather(tape, s, skip, velocity, target)
     end_stage(tape, s, half)
