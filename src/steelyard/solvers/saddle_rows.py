@@ -79,11 +79,8 @@ def pull(tape, s, work):
 
 
 @inner
-def keep_multipliers(tape, s, fresh, dt):
-    """Note the multipliers of the step's start; worlds in which a link is off its length.
-
-    Of worlds that start afresh also those in which one is about to leave it: it cannot follow the velocities given.
-    """
+def keep_multipliers(tape, s):
+    """Note the multipliers of the step's start; worlds in which a link is off its length."""
     zero = splat(0.0)
     one = splat(1.0)
     off = zero > zero
@@ -96,19 +93,14 @@ def keep_multipliers(tape, s, fresh, dt):
         near = _near(tape, s, length)
         over = error > near
         short = error < zero - near
-        leaves = dt * (link_rate(s, link, tape) - length * load(s, tape[link + 9]))
         if tape[link + 10] == 0:
             over = over | short
-            leaves = absolute(leaves)
-        else:
-            leaves = select(short, zero, leaves)
         store(s, tape[link + 14] + 1, select(over, one, zero))
-        off = off | over | (fresh & (leaves > near))
+        off = off | over
     at = tape[H_RIDERS] + 1
     for _ in range(tape[tape[H_RIDERS]]):
         for axis in range(3):
             off = off | (absolute(rider_offset(s, tape, at, axis)) > splat(_NEAR))
-            off = off | (fresh & (absolute(dt * rider_slip(s, tape, at, axis)) > splat(_NEAR)))
         at += HEAD + DECK * tape[at + 6]
     return off
 
@@ -212,6 +204,26 @@ def taut_at_rest(tape, s, dt):
             stays = (link_half_square(s, link, tape, length) > least) & (dt * rate > least)
             taut = select(stays, one, zero)
         store(s, tape[link + 15], taut)
+
+
+@inner
+def leaving(tape, s, dt):
+    """Worlds whose velocities taut links or riders cannot follow."""
+    zero = splat(0.0)
+    found = zero > zero
+    at = tape[H_LINKS]
+    for index in range(tape[at]):
+        link = at + 1 + LINK * index
+        length = load(s, tape[link + 8])
+        leaves = dt * (link_rate(s, link, tape) - length * load(s, tape[link + 9]))
+        leaves = absolute(leaves) * load(s, tape[link + 15])
+        found = found | (leaves > _near(tape, s, length))
+    at = tape[H_RIDERS] + 1
+    for _ in range(tape[tape[H_RIDERS]]):
+        for axis in range(3):
+            found = found | (absolute(dt * rider_slip(s, tape, at, axis)) > splat(_NEAR))
+        at += HEAD + DECK * tape[at + 6]
+    return found
 
 
 @inner
