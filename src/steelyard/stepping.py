@@ -72,8 +72,11 @@ def _load_rows(s, source, width, count, targets, by_name, picked, whole):
 def _store_block(tape, s, state, width, picked, count, whole):
     """Copy the state of the picked worlds back, but of those that are given up."""
     given_up = load(s, tape[H_GIVEN_UP]) > splat(0.5)
-    if whole:
-        first = picked[0]
+    first = picked[0]
+    if whole and not any_lane(given_up):
+        for row in range(tape[H_STATE_ROWS]):
+            store_at(state, width * row + first, load(s, row))
+    elif whole:
         for row in range(tape[H_STATE_ROWS]):
             entry = width * row + first
             store_at(state, entry, select(given_up, load_at(state, entry), load(s, row)))
