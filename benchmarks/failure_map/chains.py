@@ -79,6 +79,7 @@ def left_by_one_pass(substeps: int) -> Callable[[int, float], float]:
 CASES = (
     ChainCase("RATTLE, direct", sy.Rattle(), sy.Direct(), geometric_stiffness),
     ChainCase("symplectic Euler, direct", sy.SymplecticEuler(), sy.Direct(), geometric_stiffness),
+    ChainCase("generalised-alpha, rho 0", sy.GeneralisedAlpha(rho_inf=0.0), None),
     ChainCase("RATTLE, 20 sweeps", sy.Rattle(), sy.GaussSeidel(passes=20)),
     ChainCase("XPBD, 20 substeps", sy.SymplecticEuler(), sy.Xpbd(substeps=20), left_by_one_pass(20)),
     ChainCase("symplectic Euler, worst first", sy.SymplecticEuler(), sy.WorstFirst()),
@@ -176,13 +177,16 @@ def run(*, quick: bool, output: Path) -> list[Figure]:
     payload = {
         "quick": quick,
         "figures": [figure.record() for figure in figures],
-        "units": "largest step over tau = sqrt(l/g); 0: none down to the least of the search",
+        "units": "largest step over tau = sqrt(l/g); 0: none down to the least of the search, null: all of it hold",
         "stretch": STRETCH,
         "energy": ENERGY,
         "links": links,
         "end_mass_ratios": ratios,
         "search": steps,
-        "largest_step": found,
+        "largest_step": {
+            name: np.where(np.isfinite(values), values, None).tolist()
+            for name, values in found.items()
+        },
         "predicted": {c.name: theory(c, links, ratios) for c in CASES if c.limit is not None},
     }
     record.write("chains", payload, directory=output)
@@ -203,7 +207,7 @@ def draw(
     found: Mapping[str, Array], links: Sequence[int], ratios: Array, steps: Array, path: Path
 ) -> None:
     """A map per case, and the longest chain of all cases beside the theory."""
-    columns = 3
+    columns = 4
     rows = -(-(len(found) + 1) // columns)
     figure, panels = plt.subplots(
         rows, columns, figsize=(5.6 * columns, 4.3 * rows), layout="constrained"
@@ -228,12 +232,13 @@ def draw(
 def _draw_map(
     panel: Axes, name: str, values: Array, links: Sequence[int], ratios: Array, norm: LogNorm
 ) -> None:
-    shown = np.ma.masked_less_equal(values, 0.0)
+    most = STEPS[-1]
+    shown = np.ma.masked_less_equal(np.minimum(values, most), 0.0)
     panel.imshow(shown, norm=norm, cmap="viridis", origin="lower", aspect="auto")
     panel.set_facecolor("0.85")
     for row, column in np.ndindex(*values.shape):
         value = float(values[row, column])
-        text = f"{value:.2g}" if value > 0.0 else "none"
+        text = "none" if value <= 0.0 else f"{value:.2g}" if math.isfinite(value) else f"> {most:g}"
         # Light on the dark half of the scale.
         light = 0.0 < value < math.sqrt(norm.vmin * norm.vmax)
         panel.text(column, row, text, ha="center", va="center", fontsize=8,

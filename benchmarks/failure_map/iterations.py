@@ -21,13 +21,17 @@ from benchmarks.failure_map.bisection import Array
 from benchmarks.failure_map.chains import GRAVITY, HALF_SWING, LENGTH, TAU, chain
 from benchmarks.figures import Figure
 
-LINKS = (2, 3, 5, 8, 12, 20, 32)
+LINKS = (2, 3, 5, 8, 12, 20)
 RATIOS = (1.0, 10.0, 100.0, 1000.0)
 QUICK_LINKS, QUICK_RATIOS = (3, 8), (1.0, 100.0)
 
 #: A chain short enough for every solver to hold in principle, and a step well within its limit.
 SWUNG, DT = 5, 0.01
 COUNTS = tuple(2**k for k in range(13))
+#: From so many sweeps a digit on, what rounding leaves of each is no longer small beside what it gains.
+MOST_SWEEPS = 3e4
+#: Place in ``COUNTS`` from which the worst-first resolver gains no more.
+SETTLED = 5
 
 
 def sweep_share(links: int, ratio: float) -> float:
@@ -62,6 +66,8 @@ def left_after(links: int, ratio: float, passes: int) -> float:
 def sweeps_for_a_digit(links: int, ratio: float) -> tuple[float, float]:
     """Sweeps that divide the error by ten: measured, and by the theory."""
     theory = -math.log(10.0) / math.log(sweep_share(links, ratio))
+    if theory > MOST_SWEEPS:
+        return math.nan, theory
     # After two digits the slowest mode is alone, with five more left above rounding.
     first = max(4, round(2.0 * theory))
     second = first + max(2, round(theory))
@@ -109,14 +115,14 @@ def run(*, quick: bool, output: Path) -> list[Figure]:
         name: np.array([swing(*solvers(count)[name]) for count in counts]) for name in solvers(1)
     }
     direct = swing(sy.Rattle(), sy.Direct())
-    off = float(np.abs(digits[..., 0] / digits[..., 1] - 1.0).max())
+    off = float(np.nanmax(np.abs(digits[..., 0] / digits[..., 1] - 1.0)))
     worst = swings["worst first"][:, 0]
     sweeps = swings["RATTLE, Gauss-Seidel"][:, 0]
     figures = [
         Figure(name="Gauss-Seidel: sweeps for a digit against theory, greatest difference",
                measured=off, unit="of it", at_most=0.01),
-        Figure(name=f"worst first: stretch left by {SWUNG * counts[-1]} resolutions over that of {SWUNG}",
-               measured=float(worst[-1] / worst[0])),
+        Figure(name=f"worst first: stretch left by {SWUNG * counts[-1]} resolutions over that of "
+               f"{SWUNG * counts[SETTLED]}", measured=float(worst[-1] / worst[SETTLED])),
         Figure(name=f"Gauss-Seidel: stretch left by {counts[-1]} sweeps over that of 1",
                measured=float(sweeps[-1] / sweeps[0])),
     ]  # fmt: skip
@@ -125,7 +131,7 @@ def run(*, quick: bool, output: Path) -> list[Figure]:
         "figures": [figure.record() for figure in figures],
         "links": links,
         "end_mass_ratios": ratios,
-        "sweeps_for_a_digit": {"measured": digits[..., 0], "predicted": digits[..., 1]},
+        "sweeps_for_a_digit": {"measured": _finite(digits[..., 0]), "predicted": digits[..., 1]},
         "swing": {"links": SWUNG, "dt": DT, "columns": ["stretch", "energy over m g L"]},
         "iterations": counts,
         "left": {name: _finite(values) for name, values in swings.items()},

@@ -329,8 +329,11 @@ class World:
                 f"another model; this world has {self._state.shape}. Restore it where it was taken."
             )
         self._state[:] = snapshot.state
-        self.model.parameters.values = {key: value.copy() for key, value in snapshot.values.items()}
-        self._stale = True
+        values = self.model.parameters.values
+        if any(not np.array_equal(values[key], value) for key, value in snapshot.values.items()):
+            # What follows from parameters takes longer than many steps.
+            self.model.parameters.values = {key: v.copy() for key, v in snapshot.values.items()}
+            self._stale = True
 
     def reset(self, mask: np.ndarray | None = None) -> None:
         """Put the state of all worlds back to the scene's start, or of those in a mask.
