@@ -70,7 +70,10 @@ def judge(problem: Problem, points: Sequence[Mapping[str, Any]]) -> list[dict[st
         }  # fmt: skip
         try:
             choice = sy.choose_method(
-                problem.scene(), tolerance=tolerance, horizon=problem.duration
+                problem.scene(),
+                tolerance=tolerance,
+                horizon=problem.duration,
+                since=problem.stretch * problem.looks[0],
             )
         except ValueError as refusal:
             row |= {"refusal": str(refusal), "missed": best is not None}

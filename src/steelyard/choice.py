@@ -321,7 +321,7 @@ def _smallest(
             more = [math.ceil(factor * steps) for factor in _NEIGHBOURS]
             lucky = [count for count in more if error_at(count) > _ACCEPT * tolerance]
             if lucky:
-                low = max(low, min(max(lucky), (high or math.inf) - 1))
+                low = max(low, min(max(lucky), high - 1) if high else max(lucky))
                 error = max(map(error_at, lucky))
             else:
                 high = min(high or steps, steps)
