@@ -1,6 +1,6 @@
 """Steelyard: a batched physics engine that lets you weigh speed against accuracy."""
 
-from . import draw, scenes
+from . import draw, extension, scenes
 from .choice import CANDIDATES, Candidate, Choice, Considered, candidates, choose_method
 from .integrators.backward_euler import BackwardEuler
 from .integrators.closed_form import ClosedForm, flight, flight_fall_time, flight_impact
@@ -85,6 +85,7 @@ __all__ = [
     "candidates",
     "choose_method",
     "draw",
+    "extension",
     "flight",
     "flight_fall_time",
     "flight_impact",
