@@ -27,6 +27,7 @@ H_DT, H_FORCE, H_PARTICLES = ext.tape.H_DT, ext.tape.H_FORCE, ext.tape.H_PARTICL
 def bare_first_half(tape, s, skip, part):  # type: ignore[no-untyped-def]
     """Kick and drift."""
     dt = ext.load(s, tape[H_DT])
+    ext.damp(tape, s)
     ext.kick(tape, s, ext.splat(0.5) * dt)
     ext.drift(tape, s, dt)
 
@@ -35,6 +36,7 @@ def bare_first_half(tape, s, skip, part):  # type: ignore[no-untyped-def]
 def bare_second_half(tape, s, skip, part):  # type: ignore[no-untyped-def]
     """Kick."""
     ext.kick(tape, s, ext.splat(0.5) * ext.load(s, tape[H_DT]))
+    ext.damp(tape, s)
 
 
 @ext.inner
@@ -50,6 +52,7 @@ def sprung_first_half(tape, s, skip, part):  # type: ignore[no-untyped-def]
     """Springs, kick and drift."""
     dt = ext.load(s, tape[H_DT])
     sum_springs(tape, s)
+    ext.damp(tape, s)
     ext.kick(tape, s, ext.splat(0.5) * dt)
     ext.drift(tape, s, dt)
 
@@ -59,6 +62,7 @@ def sprung_second_half(tape, s, skip, part):  # type: ignore[no-untyped-def]
     """Springs and kick."""
     sum_springs(tape, s)
     ext.kick(tape, s, ext.splat(0.5) * ext.load(s, tape[H_DT]))
+    ext.damp(tape, s)
 
 
 @dataclass(frozen=True)
@@ -67,7 +71,7 @@ class Bare(ext.Integrator):
 
     damping_share: ClassVar[float] = 0.5
 
-    def recipe(self, solver: ext.Solver | None) -> ext.Recipe:
+    def recipe(self, solver: ext.Solver | None, acting: ext.Acting) -> ext.Recipe:
         """Both halves."""
         return ((bare_first_half, 0), (bare_second_half, 1))
 
@@ -78,7 +82,7 @@ class Sprung(ext.Integrator):
 
     damping_share: ClassVar[float] = 0.5
 
-    def recipe(self, solver: ext.Solver | None) -> ext.Recipe:
+    def recipe(self, solver: ext.Solver | None, acting: ext.Acting) -> ext.Recipe:
         """Both halves."""
         return ((sprung_first_half, 0), (sprung_second_half, 1))
 

@@ -1,7 +1,7 @@
 """What a method of one's own is written with: an ``Integrator`` in one file, beside those of ``integrators``.
 
     class MyMethod(sy.extension.Integrator):
-        def recipe(self, solver): return ((my_step, 0),)
+        def recipe(self, solver, acting): return ((my_step, 0),)
         def order(self): return 1
         def stable_limit(self): return 2.0
 
@@ -14,7 +14,7 @@ the tape names (``model.tape``). The file of any method shows how.
 
 from .forces.accumulate import accumulate_forces
 from .forces.springs import add_springs
-from .integrators.base import Integrator, Recipe
+from .integrators.base import Acting, Integrator, Recipe
 from .integrators.motion import damp, drift, kick
 from .kernel import inner
 from .math.lanes import absolute, any_lane, fma, load, select, splat, sqrt, store
@@ -23,6 +23,7 @@ from .solvers.base import Solver
 from .stage import Stage, stage
 
 __all__ = [
+    "Acting",
     "Integrator",
     "Recipe",
     "Solver",

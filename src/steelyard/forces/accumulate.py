@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 from ..kernel import inner
 from ..math.lanes import any_lane, load, splat, store
 from ..model.tape import H_ACTIVE, H_FORCE, H_FORCED, H_PARTICLES, H_USER_FORCES
@@ -13,21 +15,33 @@ from .springs import add_springs
 
 
 @inner
+def clear_forces(tape, s):
+    """Force rows = 0."""
+    zero = splat(0.0)
+    for row in range(3 * tape[H_PARTICLES] + 3):
+        store(s, tape[H_FORCE] + row, zero)
+
+
+@inner
+def add_written_forces(tape, s):
+    """Add what user-written forces sum to."""
+    given = tape[H_USER_FORCES]
+    for row in range(3 * tape[H_PARTICLES]):
+        f = tape[H_FORCE] + row
+        store(s, f, load(s, f) + load(s, given + row))
+
+
+@inner
 def accumulate_forces(tape, s):
     """Clear the force rows and add all forces but drag, which integrators treat in their own way."""
     if tape[H_FORCED] == 0:
         return
-    zero = splat(0.0)
-    for row in range(3 * tape[H_PARTICLES] + 3):
-        store(s, tape[H_FORCE] + row, zero)
+    clear_forces(tape, s)
     add_springs(tape, s)
     add_gravity(tape, s)
     add_buoyancy(tape, s)
-    given = tape[H_USER_FORCES]
-    if given >= 0:
-        for row in range(3 * tape[H_PARTICLES]):
-            f = tape[H_FORCE] + row
-            store(s, f, load(s, f) + load(s, given + row))
+    if tape[H_USER_FORCES] >= 0:
+        add_written_forces(tape, s)
 
 
 @stage
@@ -36,3 +50,22 @@ def sum_forces(tape, s, skip, part):
     if any_lane(load(s, tape[H_ACTIVE]) > splat(0.5)):
         accumulate_forces(tape, s)
         add_drag(tape, s)
+
+
+@cache
+def acting_forces(springs, gravities, buoyancies, written):
+    """``accumulate_forces`` for the declared kinds alone, which costs what they cost."""
+
+    @inner
+    def accumulate(tape, s):
+        clear_forces(tape, s)
+        if springs:
+            add_springs(tape, s)
+        if gravities:
+            add_gravity(tape, s)
+        if buoyancies:
+            add_buoyancy(tape, s)
+        if written:
+            add_written_forces(tape, s)
+
+    return accumulate

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from ..solvers.base import Solver
-from .base import Integrator, Recipe
+from .base import Acting, Integrator, Recipe
 from .one_leg import one_leg_recipe
 
 
@@ -38,7 +38,7 @@ class BackwardEuler(Integrator):
     reach: ClassVar[float] = 1.0
     work: ClassVar[int] = 6
 
-    def recipe(self, solver: Solver | None) -> Recipe:
+    def recipe(self, solver: Solver | None, acting: Acting) -> Recipe:
         """Newton's method for the state at the step's end."""
         return one_leg_recipe(self.passes)
 

@@ -3,12 +3,28 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 from ..solvers.base import Solver
 from ..stage import Stage
 
 Recipe = tuple[tuple[Stage, int], ...]
+
+
+class Acting(NamedTuple):
+    """Kinds of forces that a scene declares; stages are compiled for those alone."""
+
+    springs: bool = False
+    gravities: bool = False
+    buoyancies: bool = False
+    written: bool = False
+    drags: bool = False
+    stiff_springs: bool = False
+
+    @property
+    def summed(self) -> bool:
+        """Whether any is a force that is summed."""
+        return self.springs or self.gravities or self.buoyancies or self.written
 
 
 @dataclass(frozen=True)
@@ -51,11 +67,12 @@ class Integrator:
         """Numbers that its stages find in rows of the scratch, given the step [s]."""
         return ()
 
-    def recipe(self, solver: Solver | None) -> Recipe:
+    def recipe(self, solver: Solver | None, acting: Acting) -> Recipe:
         """Stages of a step in order, each with its part: of most methods 0, or 1 for what follows the new positions.
 
         Args:
             solver: what holds the constraints; None where there are none.
+            acting: what forces there are.
         """
         raise NotImplementedError
 

@@ -23,7 +23,7 @@ from ..model.tape import H_ACCELERATION, H_DAMPING, H_DRIFT, H_POSITION, H_VELOC
 from ..scene import checks
 from ..solvers.base import Solver
 from ..stage import stage
-from .base import Integrator, Recipe
+from .base import Acting, Integrator, Recipe
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class ClosedForm(Integrator):
 
     flies: ClassVar[bool] = True
 
-    def recipe(self, solver: Solver | None) -> Recipe:
+    def recipe(self, solver: Solver | None, acting: Acting) -> Recipe:
         """One exact flow."""
         return ((closed_form_step, 0),)
 

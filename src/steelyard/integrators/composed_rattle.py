@@ -44,8 +44,8 @@ from ..scene import checks
 from ..solvers.base import Solver
 from ..solvers.stages import begin_step
 from ..stage import stage
-from .base import Integrator, Recipe
-from .rattle import rattle_first_half, rattle_second_half
+from .base import Acting, Integrator, Recipe
+from .rattle import rattle_halves
 
 
 def _around(*first: float) -> tuple[float, ...]:
@@ -102,10 +102,11 @@ class ComposedRattle(Integrator):
         """Length of each substep over that of the step."""
         return _COMPOSITIONS[self.substeps][0]
 
-    def recipe(self, solver: Solver | None) -> Recipe:
+    def recipe(self, solver: Solver | None, acting: Acting) -> Recipe:
         """The recipe of RATTLE once for each substep; the step's own length is put back for the clock."""
-        first: Recipe = ((rattle_first_half, 0),)
-        second: Recipe = ((rattle_second_half, 1),)
+        halves = rattle_halves(acting)
+        first: Recipe = ((halves[0], 0),)
+        second: Recipe = ((halves[1], 1),)
         if solver is not None:
             first = ((begin_step, 0), (move_controls, 0), *first, (solver.stage, 0))
             second = (*second, (solver.stage, 1))

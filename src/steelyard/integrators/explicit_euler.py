@@ -27,7 +27,7 @@ from ..model.tape import (
 )
 from ..solvers.base import Solver
 from ..stage import stage
-from .base import Integrator, Recipe
+from .base import Acting, Integrator, Recipe
 from .motion import damp
 
 
@@ -38,7 +38,7 @@ class ExplicitEuler(Integrator):
     sums_drag: ClassVar[bool] = True
     solver_stages: ClassVar[tuple[bool, ...]] = (False,)
 
-    def recipe(self, solver: Solver | None) -> Recipe:
+    def recipe(self, solver: Solver | None, acting: Acting) -> Recipe:
         """Integrate; contacts are resolved afterwards."""
         own = (explicit_euler_step, 0)
         return (own,) if solver is None else (own, (solver.stage, 0))

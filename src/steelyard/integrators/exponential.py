@@ -39,7 +39,7 @@ from ..model.tape import (
 )
 from ..solvers.base import Solver
 from ..stage import stage
-from .base import Integrator, Recipe
+from .base import Acting, Integrator, Recipe
 
 #: Rows of a particle's coefficients: exp(h L/2), exp(h L), then pairs (place, speed) of weights of N.
 HALF, WHOLE, WEIGHTS = 0, 4, 8
@@ -55,7 +55,7 @@ class ExponentialRungeKutta(Integrator):
     evaluations: ClassVar[tuple[float | None, ...]] = (0.0, 0.5, 0.5, 1.0)
     work: ClassVar[int] = 12
 
-    def recipe(self, solver: Solver | None) -> Recipe:
+    def recipe(self, solver: Solver | None, acting: Acting) -> Recipe:
         """Four evaluations of what is not linear."""
         return tuple((each, part) for part in range(4) for each in (sum_forces, exponential_part))
 

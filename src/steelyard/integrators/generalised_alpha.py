@@ -80,7 +80,7 @@ from ..solvers.saddle_rows import (
     velocity_rows,
 )
 from ..stage import call_stage, stage
-from .base import Integrator, Recipe
+from .base import Acting, Integrator, Recipe
 from .implicit import UNKNOWN, load_force
 
 _SHARE = checks.Limit(least=0.0, most=1.0, remedy="Use 0 where motion is violent, 0.3 elsewhere.")
@@ -131,7 +131,7 @@ class GeneralisedAlpha(Integrator):
             am / (1.0 - am), dt * (1.0 - g), dt * g, 1.0 / new,
         )  # fmt: skip
 
-    def recipe(self, solver: Solver | None) -> Recipe:
+    def recipe(self, solver: Solver | None, acting: Acting) -> Recipe:
         """Prediction, Newton's method, new velocities."""
         return (
             (generalised_alpha_begin, 0),

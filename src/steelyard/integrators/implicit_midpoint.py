@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from ..solvers.base import Solver
-from .base import Integrator, Recipe
+from .base import Acting, Integrator, Recipe
 from .one_leg import one_leg_recipe
 
 
@@ -40,7 +40,7 @@ class ImplicitMidpoint(Integrator):
     reach: ClassVar[float] = 0.5
     work: ClassVar[int] = 6
 
-    def recipe(self, solver: Solver | None) -> Recipe:
+    def recipe(self, solver: Solver | None, acting: Acting) -> Recipe:
         """Newton's method for the state at mid-step, then on to the end."""
         return one_leg_recipe(self.passes)
 

@@ -31,7 +31,7 @@ from ..math.lanes import fma, load, splat, store
 from ..model.tape import H_ACTIVE, H_DT, H_PARTICLES, H_POSITION, H_REACH, H_VELOCITY, H_WORK
 from ..solvers.base import Solver
 from ..stage import stage
-from .base import Integrator, Recipe
+from .base import Acting, Integrator, Recipe
 from .one_leg import one_leg, one_leg_begin
 
 _GAMMA = 1.0 - 1.0 / math.sqrt(2.0)
@@ -56,7 +56,7 @@ class LinearlyImplicit(Integrator):
     reach: ClassVar[float] = _GAMMA
     work: ClassVar[int] = 6
 
-    def recipe(self, solver: Solver | None) -> Recipe:
+    def recipe(self, solver: Solver | None, acting: Acting) -> Recipe:
         """Two legs; the second begins where the first has led."""
         first, second = one_leg(self.passes, 1), one_leg(self.passes, 2)
         return ((one_leg_begin, 0), *first, (second_leg_begin, 1), *second)

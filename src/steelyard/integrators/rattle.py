@@ -11,18 +11,19 @@ are resolved to the step (order 1 in their time), after Capobianco, Harsch, Eugs
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from typing import ClassVar
 
 from ..constraints.controls import move_controls
-from ..forces.accumulate import accumulate_forces
+from ..forces.accumulate import acting_forces
 from ..forces.drag import flow_drag
 from ..forces.stiff_spring import flow_stiff_springs
 from ..math.lanes import load, splat
 from ..model.tape import H_DT
 from ..solvers.base import Solver
 from ..solvers.stages import begin_step
-from ..stage import stage
-from .base import Integrator, Recipe
+from ..stage import Stage, stage
+from .base import Acting, Integrator, Recipe
 from .motion import damp, drift, kick
 
 
@@ -34,16 +35,17 @@ class Rattle(Integrator):
     evaluations: ClassVar[tuple[float | None, ...]] = (0.0, 1.0)
     solver_stages: ClassVar[tuple[bool, ...]] = (True,)
 
-    def recipe(self, solver: Solver | None) -> Recipe:
+    def recipe(self, solver: Solver | None, acting: Acting) -> Recipe:
         """Both halves, each followed by its stage of the constraints."""
+        first, second = rattle_halves(acting)
         if solver is None:
-            return ((rattle_first_half, 0), (rattle_second_half, 1))
+            return ((first, 0), (second, 1))
         return (
             (begin_step, 0),
             (move_controls, 0),
-            (rattle_first_half, 0),
+            (first, 0),
             (solver.stage, 0),
-            (rattle_second_half, 1),
+            (second, 1),
             (solver.stage, 1),
         )
 
@@ -56,22 +58,34 @@ class Rattle(Integrator):
         return 2.0
 
 
-@stage
-def rattle_first_half(tape, s, skip, half):
-    """Up to the drift; the position stage follows."""
-    dt = load(s, tape[H_DT])
-    accumulate_forces(tape, s)
-    damp(tape, s)
-    flow_drag(tape, s, False)
-    kick(tape, s, splat(0.5) * dt)
-    drift(tape, s, dt)
-    flow_stiff_springs(tape, s)
+@cache
+def rattle_halves(acting: Acting) -> tuple[Stage, Stage]:
+    """Both halves for the forces of a scene: up to the drift, and from the new positions on."""
+    summed, drags, stiff_springs = acting.summed, acting.drags, acting.stiff_springs
+    accumulate = acting_forces(*acting[:4])
 
+    @stage
+    def rattle_first_half(tape, s, skip, half):
+        """The position stage follows."""
+        dt = load(s, tape[H_DT])
+        if summed:
+            accumulate(tape, s)
+        damp(tape, s)
+        if drags:
+            flow_drag(tape, s, False)
+        kick(tape, s, splat(0.5) * dt)
+        drift(tape, s, dt)
+        if stiff_springs:
+            flow_stiff_springs(tape, s)
 
-@stage
-def rattle_second_half(tape, s, skip, half):
-    """From the new positions on; the velocity stage follows."""
-    accumulate_forces(tape, s)
-    kick(tape, s, splat(0.5) * load(s, tape[H_DT]))
-    flow_drag(tape, s, True)
-    damp(tape, s)
+    @stage
+    def rattle_second_half(tape, s, skip, half):
+        """The velocity stage follows."""
+        if summed:
+            accumulate(tape, s)
+        kick(tape, s, splat(0.5) * load(s, tape[H_DT]))
+        if drags:
+            flow_drag(tape, s, True)
+        damp(tape, s)
+
+    return rattle_first_half, rattle_second_half

@@ -35,7 +35,7 @@ from ..model.tape import (
 )
 from ..solvers.base import Solver
 from ..stage import stage
-from .base import Integrator, Recipe
+from .base import Acting, Integrator, Recipe
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class RungeKutta4(Integrator):
     evaluations: ClassVar[tuple[float | None, ...]] = (0.0, 0.5, 0.5, 1.0)
     work: ClassVar[int] = 12
 
-    def recipe(self, solver: Solver | None) -> Recipe:
+    def recipe(self, solver: Solver | None, acting: Acting) -> Recipe:
         """Four evaluations, each with its part of the sum."""
         return tuple((each, part) for part in range(4) for each in (sum_forces, rk4_part))
 

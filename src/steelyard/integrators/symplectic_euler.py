@@ -7,18 +7,19 @@ by their exact flow before the kick.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from typing import ClassVar
 
 from ..constraints.controls import move_controls
-from ..forces.accumulate import accumulate_forces
+from ..forces.accumulate import acting_forces
 from ..forces.drag import flow_drag
 from ..forces.stiff_spring import flow_stiff_springs
 from ..math.lanes import load
 from ..model.tape import H_DT
 from ..solvers.base import Solver
 from ..solvers.stages import begin_step
-from ..stage import stage
-from .base import Integrator, Recipe
+from ..stage import Stage, stage
+from .base import Acting, Integrator, Recipe
 from .motion import damp, drift, kick
 
 
@@ -28,16 +29,17 @@ class SymplecticEuler(Integrator):
 
     solver_stages: ClassVar[tuple[bool, ...]] = (True, False)
 
-    def recipe(self, solver: Solver | None) -> Recipe:
+    def recipe(self, solver: Solver | None, acting: Acting) -> Recipe:
         """Damp, kick and drift, then the constraints."""
+        own = symplectic_euler_step(acting)
         if solver is None:
-            return ((symplectic_euler_step, 0),)
+            return ((own, 0),)
         if not solver.staged:
-            return ((move_controls, 0), (symplectic_euler_step, 0), (solver.stage, 0))
+            return ((move_controls, 0), (own, 0), (solver.stage, 0))
         return (
             (begin_step, 0),
             (move_controls, 0),
-            (symplectic_euler_step, 0),
+            (own, 0),
             (solver.stage, 0),
             (solver.stage, 1),
         )
@@ -51,13 +53,23 @@ class SymplecticEuler(Integrator):
         return 2.0
 
 
-@stage
-def symplectic_euler_step(tape, s, skip, half):
-    """Damp, kick and drift; constraints follow."""
-    dt = load(s, tape[H_DT])
-    accumulate_forces(tape, s)
-    damp(tape, s)
-    flow_drag(tape, s, False)
-    kick(tape, s, dt)
-    drift(tape, s, dt)
-    flow_stiff_springs(tape, s)
+@cache
+def symplectic_euler_step(acting: Acting) -> Stage:
+    """Damp, kick and drift under the forces of a scene; constraints follow."""
+    summed, drags, stiff_springs = acting.summed, acting.drags, acting.stiff_springs
+    accumulate = acting_forces(*acting[:4])
+
+    @stage
+    def symplectic_euler_step(tape, s, skip, half):
+        dt = load(s, tape[H_DT])
+        if summed:
+            accumulate(tape, s)
+        damp(tape, s)
+        if drags:
+            flow_drag(tape, s, False)
+        kick(tape, s, dt)
+        drift(tape, s, dt)
+        if stiff_springs:
+            flow_stiff_springs(tape, s)
+
+    return symplectic_euler_step

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..integrators.base import Recipe
+from ..integrators.base import Acting, Recipe
 from ..math.pointers import LANES
 from ..methods import Method
 from ..scene.contacts import (
@@ -334,6 +334,18 @@ class Compiler:
         numbers = np.array(self.method.integrator.constants(self.method.dt))
         return self.slot(len(numbers), (), lambda: numbers)
 
+    def _acting(self) -> Acting:
+        """Kinds of forces that are on the tape."""
+        sections = self.sections
+        return Acting(
+            springs=bool(sections["springs"]),
+            gravities=bool(sections["gravities"]),
+            buoyancies=bool(sections["buoyancies"]),
+            written=self.header["user_forces"] >= 0,
+            drags=bool(sections["drags"]),
+            stiff_springs=bool(sections["stiff_springs"]),
+        )
+
     def some(self, chosen: Any) -> list[Particle]:
         """The chosen particles, or all."""
         return self.particles if chosen is None else list(chosen)
@@ -342,7 +354,7 @@ class Compiler:
         """Codes and settings of the method, and the generators in the order they were added."""
         solver = self.method.solver
         held = solver if self.header["constrained"] else None
-        recipe = self.method.integrator.recipe(held)
+        recipe = self.method.integrator.recipe(held, self._acting())
         self.sections["recipe"] = [word for stage, part in recipe for word in (stage.address, part)]
         self.model.recipe = recipe
         self.header["hasty"] = int(bool(held and held.sparse and self.contacts))
