@@ -18,7 +18,7 @@ class TaskEnv(gym.Env[Any, Any]):
 
     Args:
         render_mode: None, "human" or "rgb_array".
-        **task: arguments of the task: difficulty, method, physics_rate, control_rate.
+        **task: arguments of the task: difficulty, method, physics_rate, control_rate, tolerance.
     """
 
     task_class: ClassVar[type[Task]]

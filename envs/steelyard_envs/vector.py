@@ -26,7 +26,7 @@ class TaskVectorEnv(gym.vector.VectorEnv[Array, Array, Array]):
             and ``final_info`` are in the info) or DISABLED: a finished row goes on until
             ``reset(options={"reset_mask": mask})``.
         render_mode: None, "human" (the first world, at every step) or "rgb_array" (every world).
-        **task: arguments of the task: difficulty, method, physics_rate, control_rate.
+        **task: arguments of the task: difficulty, method, physics_rate, control_rate, tolerance.
     """
 
     task_class: ClassVar[type[Task]]
