@@ -8,7 +8,7 @@ for all scenes, methods and environments.
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cached_property, update_wrapper
+from functools import update_wrapper
 from typing import Any
 
 from llvmlite import ir
@@ -17,7 +17,7 @@ from numba.core.ccallback import CFunc
 from numba.core.extending import intrinsic
 
 from .kernel import OPTIONS, stamp
-from .math.pointers import Doubles, Integers, Tape
+from .math.pointers import Doubles, Integers, PlanarDoubles, Tape
 
 
 class Stage:
@@ -33,18 +33,20 @@ class Stage:
         self._function = function
         self._arguments = arguments
 
-    @cached_property
-    def _compiled(self) -> Any:
-        compiled: Any = CFunc(self._function, (self._arguments, types.void), {}, OPTIONS)
-        compiled.enable_caching()
-        stamp(compiled._cache, self._function)
-        compiled.compile()
-        return compiled
+        #: Machine code, by whether it is for planar scenes.
+        self._compiled: dict[bool, Any] = {}
 
-    @property
-    def address(self) -> int:
+    def address(self, *, planar: bool) -> int:
         """Where its machine code lies; compiled, or loaded from the cache, at first."""
-        address: int = self._compiled.address
+        if planar not in self._compiled:
+            swap = {Doubles: PlanarDoubles} if planar else {}
+            arguments = tuple(swap.get(argument, argument) for argument in self._arguments)
+            compiled: Any = CFunc(self._function, (arguments, types.void), {}, OPTIONS)
+            compiled.enable_caching()
+            stamp(compiled._cache, self._function)
+            compiled.compile()
+            self._compiled[planar] = compiled
+        address: int = self._compiled[planar].address
         return address
 
 
@@ -66,16 +68,21 @@ def caller(arguments: tuple[types.Type, ...]) -> Any:
         builder.call(builder.inttoptr(args[0], function.as_pointer()), args[1:])
         return context.get_dummy_value()
 
-    signature = types.void(types.int64, *arguments)
+    def signature(*given: types.Type) -> Any:
+        # Scratch of planar scenes is passed on as such: the stage at the address was compiled for it.
+        pairs = zip(given, arguments, strict=True)
+        return types.void(types.int64, *(a if a == PlanarDoubles else b for a, b in pairs))
 
     def call_4(typing_context: Any, address: Any, a: Any, b: Any, c: Any, d: Any) -> Any:
-        return signature, codegen
+        return signature(a, b, c, d), codegen
 
-    def call_5(typing_context: Any, address: Any, a: Any, b: Any, c: Any, d: Any, e: Any) -> Any:
-        return signature, codegen
+    def call_6(
+        typing_context: Any, address: Any, a: Any, b: Any, c: Any, d: Any, e: Any, f: Any
+    ) -> Any:
+        return signature(a, b, c, d, e, f), codegen
 
     # numba reads the number of arguments off the function.
-    by_count: Any = {4: call_4, 5: call_5}
+    by_count: Any = {4: call_4, 6: call_6}
     return intrinsic(by_count[len(arguments)])
 
 

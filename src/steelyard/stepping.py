@@ -13,7 +13,7 @@ from numba import types
 
 from .kernel import inner, kernel
 from .math.lanes import any_lane, fma, load, load_at, select, splat, store, store_at
-from .math.pointers import LANES, Integers, doubles_at, integers_at, tape_at
+from .math.pointers import LANES, Doubles, Integers, axes, doubles_at, integers_at, tape_at
 from .model.tape import (
     FRESH,
     H_BLOCKS,
@@ -56,16 +56,30 @@ _HASTY_STEPS = 2
 
 
 @inner
-def _load_rows(s, source, width, count, targets, by_name, picked, whole):
-    """Copy rows of ``source`` to the scratch: to ``targets`` if ``by_name``, else to its first rows."""
-    first = picked[0]
-    for index in range(count):
-        row = targets[index] if by_name else index
-        if whole:
-            store(s, row, load_at(source, width * index + first))
+def _moves(tape, s, row):
+    """Whether a row of the state can change: in a planar scene, not where it is a third coordinate."""
+    return axes(s) == 3 or row % 3 != 2 or row >= 6 * tape[H_PARTICLES]
+
+
+@inner
+def _load_row(s, row, source, start, picked, whole):
+    if whole:
+        store(s, row, load_at(source, start + picked[0]))
+    else:
+        for k in range(LANES):
+            s[row, k] = source[start + picked[k]]
+
+
+@inner
+def _load_block(tape, s, state, given, given_rows, given_count, width, picked, whole):
+    """Copy the state of the picked worlds, and their own parameters, to the scratch."""
+    for row in range(tape[H_STATE_ROWS]):
+        if _moves(tape, s, row):
+            _load_row(s, row, state, width * row, picked, whole)
         else:
-            for k in range(LANES):
-                s[row, k] = source[width * index + picked[k]]
+            store(s, row, splat(0.0))
+    for index in range(given_count):
+        _load_row(s, given_rows[index], given, width * index, picked, whole)
 
 
 @inner
@@ -75,16 +89,19 @@ def _store_block(tape, s, state, width, picked, count, whole):
     first = picked[0]
     if whole and not any_lane(given_up):
         for row in range(tape[H_STATE_ROWS]):
-            store_at(state, width * row + first, load(s, row))
+            if _moves(tape, s, row):
+                store_at(state, width * row + first, load(s, row))
     elif whole:
         for row in range(tape[H_STATE_ROWS]):
-            entry = width * row + first
-            store_at(state, entry, select(given_up, load_at(state, entry), load(s, row)))
+            if _moves(tape, s, row):
+                entry = width * row + first
+                store_at(state, entry, select(given_up, load_at(state, entry), load(s, row)))
     else:
         for k in range(count):
             if s[tape[H_GIVEN_UP], k] < 0.5:
                 for row in range(tape[H_STATE_ROWS]):
-                    state[width * row + picked[k]] = s[row, k]
+                    if _moves(tape, s, row):
+                        state[width * row + picked[k]] = s[row, k]
 
 
 @inner
@@ -92,9 +109,10 @@ def _flag_nonfinite(tape, s):
     """Set the flag of worlds whose positions or velocities are not finite."""
     zero = splat(0.0)
     sum_ = zero
-    for row in range(3 * tape[H_PARTICLES]):
-        sum_ = fma(load(s, tape[H_POSITION] + row), zero, sum_)
-        sum_ = fma(load(s, tape[H_VELOCITY] + row), zero, sum_)
+    for p in range(tape[H_PARTICLES]):
+        for axis in range(axes(s)):
+            sum_ = fma(load(s, tape[H_POSITION] + 3 * p + axis), zero, sum_)
+            sum_ = fma(load(s, tape[H_VELOCITY] + 3 * p + axis), zero, sum_)
     flag = tape[H_NONFINITE]
     store(s, flag, select(sum_ <= zero, load(s, flag), splat(1.0)))
 
@@ -112,7 +130,7 @@ def _step(tape, s, skip, phase):
         store(s, clock, load(s, clock) + load(s, tape[H_DT]))
 
 
-def _advance_blocks(launch, first, last, substeps, phase):
+def _advance_blocks(launch, s, first, last, substeps, phase):
     """Advance the worlds of blocks ``first`` ... ``last - 1`` by ``substeps``.
 
     The cost of a block is that of its hardest world. So contacts are first taken to stick; worlds where they do
@@ -120,7 +138,6 @@ def _advance_blocks(launch, first, last, substeps, phase):
     worlds of many slip.
     """
     tape = tape_at(launch[L_TAPE])
-    s = doubles_at(launch[L_SCRATCH])
     skip = integers_at(launch[L_SKIP])
     # Worlds in the block at hand, then worlds that wait for a second try.
     picked = integers_at(launch[L_PICKED])
@@ -149,8 +166,7 @@ def _advance_blocks(launch, first, last, substeps, phase):
             for k in range(LANES):
                 picked[k] = LANES * block + min(k, count - 1)
             block += 1
-        _load_rows(s, state, width, tape[H_STATE_ROWS], given_rows, False, picked, whole)
-        _load_rows(s, given, width, launch[L_GIVEN_COUNT], given_rows, True, picked, whole)
+        _load_block(tape, s, state, given, given_rows, launch[L_GIVEN_COUNT], width, picked, whole)
         store(s, tape[H_GIVEN_UP], splat(0.0))
         skip[words + HASTY] = 1 if hasty else 0
         for substep in range(substeps):
@@ -165,9 +181,17 @@ def _advance_blocks(launch, first, last, substeps, phase):
                     waiting += 1
 
 
-_ARGUMENTS = (Integers, types.int64, types.int64, types.int64, types.int64)
+_ARGUMENTS = (Integers, Doubles, types.int64, types.int64, types.int64, types.int64)
 _advance = Stage(_advance_blocks, _ARGUMENTS)
 _call_advance = caller(_ARGUMENTS)
+
+
+@inner
+def _start(launch, first, last, substeps, phase):
+    """Call the stepping kernel of a launch, an array."""
+    scratch = doubles_at(launch[L_SCRATCH])
+    pointer = integers_at(launch.ctypes.data)
+    _call_advance(launch[L_ADVANCE], pointer, scratch, first, last, substeps, phase)
 
 
 def launch(
@@ -192,8 +216,8 @@ def launch(
     addresses = [array.ctypes.data for array in arrays]
     return np.array(
         [
-            _advance.address, *addresses, state.shape[1], values.ctypes.data, rows.ctypes.data,
-            len(rows), worlds,
+            _advance.address(planar=model.scene.planar), *addresses, state.shape[1],
+            values.ctypes.data, rows.ctypes.data, len(rows), worlds,
         ],
         dtype=np.int64,
     )  # fmt: skip
@@ -202,7 +226,7 @@ def launch(
 @kernel
 def advance_blocks(launch, first, last, substeps, phase):
     """Advance the worlds of blocks ``first`` ... ``last - 1``; ``phase`` is WHOLE_STEP or bits of its parts."""
-    _call_advance(launch[L_ADVANCE], integers_at(launch.ctypes.data), first, last, substeps, phase)
+    _start(launch, first, last, substeps, phase)
 
 
 @kernel
@@ -229,6 +253,4 @@ def advance(launch, substeps):
         substeps: number of steps; a solver that divides the step takes its own within each.
     """
     blocks = (launch[L_WORLDS] + LANES - 1) // LANES
-    pointer = integers_at(launch.ctypes.data)
-    count = substeps * tape_at(launch[L_TAPE])[H_DIVISIONS]
-    _call_advance(launch[L_ADVANCE], pointer, 0, blocks, count, WHOLE_STEP)
+    _start(launch, 0, blocks, substeps * tape_at(launch[L_TAPE])[H_DIVISIONS], WHOLE_STEP)

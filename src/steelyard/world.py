@@ -421,6 +421,9 @@ class World:
         self._store(key, assigned(key, value, size=size, worlds=self.worlds))
 
     def _store(self, key: Key, value: np.ndarray) -> None:
+        if self.scene.planar and key[1] in checks.VECTORS:
+            thing = key[0]
+            checks.in_plane("World" if thing == PARTICLES else type(thing).__name__, key[1], value)
         check = self.model.parameters.checks.get(key)
         if check is not None:
             check(value)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .model.parameters import PARTICLES
+from .scene import checks
 from .scene.contacts import ContactGenerator
 from .scene.forces import UserForce
 
@@ -23,6 +24,8 @@ def evaluate_forces(world: World, later: float = 0.0) -> None:
     total = np.zeros(position.shape)
     for force in forces:
         given = force.evaluate(position, velocity, world.time + later)
+        if world.scene.planar:
+            checks.in_plane("UserForce", "force", given.reshape(-1))
         if force.particles is None:
             total += given
         else:
@@ -40,6 +43,8 @@ def generate_contacts(world: World) -> None:
         normal, depth, broken = generator.evaluate(
             position[:, a], position[:, b], world.time.copy()
         )
+        if world.scene.planar:
+            checks.in_plane("ContactGenerator", "normal", normal[~broken].reshape(-1))
         world._view(PARTICLES, "nonfinite")[broken] = 1.0
         for k in range(len(a)):
             rows = world._view(generator, f"pair {k}")

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from ..kernel import inner
 from ..math.lanes import any_lane, fma, load, select, splat, sqrt, store
+from ..math.pointers import axes
 from ..model.tape import CONTACT, GROUND, H_CONTACTS, H_TOLERANCE
 
 # Share of a penetration found at the start that one step takes back.
@@ -19,7 +20,7 @@ _RECOVERY = 0.2
 def contact_motion(s, frame, axis, xa, xb, base_a, base_b):
     """Component along a frame axis of (x_a - base_a) - (x_b - base_b); base rows below 0 are absent."""
     value = splat(0.0)
-    for component in range(3):
+    for component in range(axes(s)):
         relative = load(s, xa + component) - load(s, xb + component)
         if base_a >= 0:
             relative = relative - load(s, base_a + component)
@@ -54,7 +55,7 @@ def contact_targets(tape, s, dt, skip):
         pull = contact_motion(s, frame, 0, tape[contact + 9], tape[contact + 10], -1, -1)
         square = zero
         weight = zero
-        for component in range(3):
+        for component in range(axes(s)):
             relative = load(s, tape[contact + 3] + component) - load(
                 s, tape[contact + 4] + component
             )
@@ -140,7 +141,7 @@ def contact_impulses(tape, s, skip, velocity):
             n = load(s, multiplier)
             t = load(s, multiplier + 1)
             u = load(s, multiplier + 2)
-            for component in range(3):
+            for component in range(axes(s)):
                 part = n * load(s, frame + component)
                 part = fma(t, load(s, frame + 3 + component), part)
                 part = fma(u, load(s, frame + 6 + component), part)

@@ -9,30 +9,30 @@ from __future__ import annotations
 
 from ..kernel import inner
 from ..math.lanes import fma, load, select, splat, sqrt, store
+from ..math.pointers import axes
+from ..math.vectors import dot, load_coordinates
 from ..model.tape import H_LINKS, LINK
 
 
 @inner
 def link_half_square(s, link, tape, length):
     """(d.d - L^2)/2 at the current positions."""
-    xa = tape[link]
-    xb = tape[link + 1]
-    dx = load(s, xa) - load(s, xb)
-    dy = load(s, xa + 1) - load(s, xb + 1)
-    dz = load(s, xa + 2) - load(s, xb + 2)
-    square = fma(dz, dz, fma(dy, dy, dx * dx))
+    ax, ay, az = load_coordinates(s, tape[link])
+    bx, by, bz = load_coordinates(s, tape[link + 1])
+    x = ax - bx
+    y = ay - by
+    z = az - bz
+    square = dot(x, y, z, x, y, z)
     return splat(0.5) * fma(splat(0.0) - length, length, square)
 
 
 @inner
 def link_rate(s, link, tape):
     """d . (v_a - v_b) with the stored gradient d."""
-    va = tape[link + 2]
-    vb = tape[link + 3]
-    d = tape[link + 13]
-    rate = load(s, d) * (load(s, va) - load(s, vb))
-    rate = fma(load(s, d + 1), load(s, va + 1) - load(s, vb + 1), rate)
-    return fma(load(s, d + 2), load(s, va + 2) - load(s, vb + 2), rate)
+    ax, ay, az = load_coordinates(s, tape[link + 2])
+    bx, by, bz = load_coordinates(s, tape[link + 3])
+    x, y, z = load_coordinates(s, tape[link + 13])
+    return dot(x, y, z, ax - bx, ay - by, az - bz)
 
 
 @inner
@@ -44,7 +44,7 @@ def link_gradients(tape, s):
         xa = tape[link]
         xb = tape[link + 1]
         d = tape[link + 13]
-        for component in range(3):
+        for component in range(axes(s)):
             store(s, d + component, load(s, xa + component) - load(s, xb + component))
 
 
@@ -69,10 +69,8 @@ def link_targets(tape, s, dt):
         else:
             closing = link_rate(s, link, tape) - length * rate
             # The rebound is a rate of g at full length; the closing was measured short of it.
-            d = tape[link + 13]
-            square = load(s, d) * load(s, d)
-            square = fma(load(s, d + 1), load(s, d + 1), square)
-            square = fma(load(s, d + 2), load(s, d + 2), square)
+            x, y, z = load_coordinates(s, tape[link + 13])
+            square = dot(x, y, z, x, y, z)
             closing = closing * length / sqrt(select(square > zero, square, splat(1.0)))
             rebound = select(closing > zero, closing * load(s, tape[link + 11]), zero)
             store(s, tape[link + 14], follow - rebound)
@@ -96,7 +94,7 @@ def link_impulses(tape, s, velocity):
         fb = tape[link + 5]
         multiplier = load(s, link_multiplier(tape, link, velocity))
         d = tape[link + 13]
-        for component in range(3):
+        for component in range(axes(s)):
             part = multiplier * load(s, d + component)
             store(s, fa + component, load(s, fa + component) - part)
             store(s, fb + component, load(s, fb + component) + part)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from ..kernel import inner
 from ..math.lanes import fma, load, splat, store
+from ..math.pointers import axes
 from ..model.tape import H_MOVERS, H_RIDERS
 
 HEAD = 10
@@ -78,7 +79,7 @@ def rider_impulses(tape, s, velocity):
     at = tape[H_RIDERS] + 1
     for _ in range(tape[tape[H_RIDERS]]):
         count = tape[at + 6]
-        for component in range(3):
+        for component in range(axes(s)):
             part = load(s, rider_multiplier(tape, at, velocity) + component)
             f = tape[at + 2] + component
             store(s, f, load(s, f) + part)

@@ -6,6 +6,7 @@ from functools import cache
 
 from ..kernel import inner
 from ..math.lanes import any_lane, load, splat, store
+from ..math.pointers import axes
 from ..model.tape import H_ACTIVE, H_FORCE, H_FORCED, H_PARTICLES, H_USER_FORCES
 from ..stage import stage
 from .buoyancy import add_buoyancy
@@ -18,17 +19,19 @@ from .springs import add_springs
 def clear_forces(tape, s):
     """Force rows = 0."""
     zero = splat(0.0)
-    for row in range(3 * tape[H_PARTICLES] + 3):
-        store(s, tape[H_FORCE] + row, zero)
+    for p in range(tape[H_PARTICLES] + 1):
+        for axis in range(axes(s)):
+            store(s, tape[H_FORCE] + 3 * p + axis, zero)
 
 
 @inner
 def add_written_forces(tape, s):
     """Add what user-written forces sum to."""
     given = tape[H_USER_FORCES]
-    for row in range(3 * tape[H_PARTICLES]):
-        f = tape[H_FORCE] + row
-        store(s, f, load(s, f) + load(s, given + row))
+    for p in range(tape[H_PARTICLES]):
+        for axis in range(axes(s)):
+            f = tape[H_FORCE] + 3 * p + axis
+            store(s, f, load(s, f) + load(s, given + 3 * p + axis))
 
 
 @inner

@@ -11,10 +11,22 @@ and the direction stays. Record: velocity, force, k1, k2, first row of the wind,
 from __future__ import annotations
 
 from ..kernel import inner
-from ..math.lanes import fma, load, splat, sqrt, store
+from ..math.lanes import fma, load, splat, sqrt
+from ..math.vectors import add_scaled, dot, load_coordinates, store_coordinates
 from ..model.tape import H_DRAGS
 
 RECORD = 7
+
+
+@inner
+def _through_air(tape, s, k):
+    """Velocity relative to the wind, and its size."""
+    vx, vy, vz = load_coordinates(s, tape[k])
+    wx, wy, wz = load_coordinates(s, tape[k + 4])
+    x = vx - wx
+    y = vy - wy
+    z = vz - wz
+    return x, y, z, sqrt(dot(x, y, z, x, y, z))
 
 
 @inner
@@ -23,17 +35,9 @@ def add_drag(tape, s):
     at = tape[H_DRAGS]
     for index in range(tape[at]):
         k = at + 1 + RECORD * index
-        v = tape[k]
-        wind = tape[k + 4]
-        x = load(s, v) - load(s, wind)
-        y = load(s, v + 1) - load(s, wind + 1)
-        z = load(s, v + 2) - load(s, wind + 2)
-        speed = sqrt(fma(z, z, fma(y, y, x * x)))
+        x, y, z, speed = _through_air(tape, s, k)
         brake = splat(0.0) - fma(load(s, tape[k + 3]), speed, load(s, tape[k + 2]))
-        f = tape[k + 1]
-        store(s, f, fma(brake, x, load(s, f)))
-        store(s, f + 1, fma(brake, y, load(s, f + 1)))
-        store(s, f + 2, fma(brake, z, load(s, f + 2)))
+        add_scaled(s, tape[k + 1], brake, x, y, z)
 
 
 @inner
@@ -46,14 +50,8 @@ def flow_drag(tape, s, backwards):
     count = tape[at]
     for index in range(count):
         k = at + 1 + RECORD * (count - 1 - index if backwards else index)
-        v = tape[k]
-        wind = tape[k + 4]
-        x = load(s, v) - load(s, wind)
-        y = load(s, v + 1) - load(s, wind + 1)
-        z = load(s, v + 2) - load(s, wind + 2)
-        speed = sqrt(fma(z, z, fma(y, y, x * x)))
+        x, y, z, speed = _through_air(tape, s, k)
         slowed = fma(load(s, tape[k + 3]) * speed, load(s, tape[k + 6]), splat(1.0))
         factor = load(s, tape[k + 5]) / slowed
-        store(s, v, fma(factor, x, load(s, wind)))
-        store(s, v + 1, fma(factor, y, load(s, wind + 1)))
-        store(s, v + 2, fma(factor, z, load(s, wind + 2)))
+        wx, wy, wz = load_coordinates(s, tape[k + 4])
+        store_coordinates(s, tape[k], fma(factor, x, wx), fma(factor, y, wy), fma(factor, z, wz))

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from ..kernel import inner
 from ..math.lanes import fma, load, store
+from ..math.pointers import axes
 from ..model.tape import H_GRAVITIES
 
 RECORD = 3
@@ -19,6 +20,6 @@ def add_gravity(tape, s):
     for index in range(tape[at]):
         k = at + 1 + RECORD * index
         mass = load(s, tape[k + 1])
-        for component in range(3):
+        for component in range(axes(s)):
             row = tape[k] + component
             store(s, row, fma(mass, load(s, tape[k + 2] + component), load(s, row)))

@@ -8,7 +8,8 @@ force, is taken as zero. Energy k (l - l0)^2 / 2.
 from __future__ import annotations
 
 from ..kernel import inner
-from ..math.lanes import fma, load, select, splat, sqrt, store
+from ..math.lanes import load, select, splat, sqrt
+from ..math.vectors import add_scaled, dot, load_coordinates
 from ..model.tape import H_SPRINGS
 
 RECORD = 7
@@ -22,12 +23,12 @@ def add_springs(tape, s):
     at = tape[H_SPRINGS]
     for index in range(tape[at]):
         k = at + 1 + RECORD * index
-        a = tape[k]
-        b = tape[k + 1]
-        x = load(s, a) - load(s, b)
-        y = load(s, a + 1) - load(s, b + 1)
-        z = load(s, a + 2) - load(s, b + 2)
-        length = sqrt(fma(z, z, fma(y, y, x * x)))
+        ax, ay, az = load_coordinates(s, tape[k])
+        bx, by, bz = load_coordinates(s, tape[k + 1])
+        x = ax - bx
+        y = ay - by
+        z = az - bz
+        length = sqrt(dot(x, y, z, x, y, z))
         stretch = length - load(s, tape[k + 5])
         if tape[k + 6] == ONE_SIDED:
             stretch = select(stretch > zero, stretch, zero)
@@ -36,12 +37,5 @@ def add_springs(tape, s):
         apart = length > zero
         pull = load(s, tape[k + 4]) * stretch / select(apart, length, splat(1.0))
         pull = select(apart, zero - pull, zero)
-        fa = tape[k + 2]
-        fb = tape[k + 3]
-        store(s, fa, fma(pull, x, load(s, fa)))
-        store(s, fa + 1, fma(pull, y, load(s, fa + 1)))
-        store(s, fa + 2, fma(pull, z, load(s, fa + 2)))
-        push = zero - pull
-        store(s, fb, fma(push, x, load(s, fb)))
-        store(s, fb + 1, fma(push, y, load(s, fb + 1)))
-        store(s, fb + 2, fma(push, z, load(s, fb + 2)))
+        add_scaled(s, tape[k + 2], pull, x, y, z)
+        add_scaled(s, tape[k + 3], zero - pull, x, y, z)

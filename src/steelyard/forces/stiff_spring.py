@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from ..kernel import inner
 from ..math.lanes import fma, load, store
+from ..math.pointers import axes
 from ..model.tape import H_CONSTRAINED, H_FORCED, H_FREE, H_POSITION, H_STIFF_SPRINGS
 
 RECORD = 8
@@ -23,7 +24,7 @@ def flow_stiff_springs(tape, s):
         k = at + 1 + RECORD * index
         p = tape[k + 5]
         inverse = load(s, tape[k + 4])
-        for component in range(3):
+        for component in range(axes(s)):
             pull = load(s, tape[k + 2] + component)
             if tape[H_FORCED] != 0:
                 pull = fma(inverse, load(s, tape[k + 3] + component), pull)

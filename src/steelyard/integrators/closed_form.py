@@ -19,6 +19,7 @@ import numpy as np
 
 from ..kernel import kernel
 from ..math.lanes import fma, load, store
+from ..math.pointers import axes
 from ..model.tape import H_ACCELERATION, H_DAMPING, H_DRIFT, H_POSITION, H_VELOCITY
 from ..scene import checks
 from ..solvers.base import Solver
@@ -54,7 +55,7 @@ def closed_form_step(tape, s, skip, half):
         decay = load(s, tape[H_DAMPING] + 3 * p)
         phi1 = load(s, tape[H_DAMPING] + 3 * p + 1)
         phi2 = load(s, tape[H_DAMPING] + 3 * p + 2)
-        for component in range(3):
+        for component in range(axes(s)):
             row = 3 * p + component
             a = load(s, tape[H_ACCELERATION] + row)
             v = load(s, tape[H_VELOCITY] + row)

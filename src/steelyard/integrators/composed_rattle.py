@@ -28,6 +28,7 @@ from typing import ClassVar
 from ..constraints.controls import move_controls
 from ..constraints.riders import DECK, HEAD
 from ..math.lanes import load, store
+from ..math.pointers import axes
 from ..model.tape import (
     FRESH,
     H_BLOCKS,
@@ -142,7 +143,7 @@ def begin_substep(tape, s, skip, part):
         store(s, row, grown * load(s, row))
     at = tape[H_RIDERS] + 1
     for _ in range(tape[tape[H_RIDERS]]):
-        for axis in range(3):
+        for axis in range(axes(s)):
             row = tape[at + 3] + axis
             store(s, row, grown * load(s, row))
         at += HEAD + DECK * tape[at + 6]

@@ -15,6 +15,7 @@ from ..forces.drag import add_drag
 from ..forces.stiff_spring import flow_stiff_springs
 from ..kernel import inner
 from ..math.lanes import load, store
+from ..math.pointers import axes
 from ..model.tape import (
     H_ACCELERATION,
     H_DRIFT,
@@ -59,7 +60,7 @@ def _integrate(tape, s, dt):
     for index in range(tape[at]):
         p = tape[at + 1 + index]
         inverse = load(s, tape[H_INVERSE_MASS] + p)
-        for component in range(3):
+        for component in range(axes(s)):
             row = 3 * p + component
             x = tape[H_POSITION] + row
             v = tape[H_VELOCITY] + row

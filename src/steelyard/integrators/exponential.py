@@ -26,6 +26,7 @@ from typing import ClassVar
 from ..forces.accumulate import sum_forces
 from ..kernel import inner
 from ..math.lanes import fma, load, store
+from ..math.pointers import axes
 from ..model.tape import (
     H_ACCELERATION,
     H_FORCE,
@@ -101,7 +102,7 @@ def exponential_part(tape, s, skip, part):
         centre = tape[at + 2 + 2 * p]
         weights = e + WEIGHTS
         inverse = load(s, tape[H_INVERSE_MASS] + p)
-        for component in range(3):
+        for component in range(axes(s)):
             row = 3 * p + component
             x = tape[H_POSITION] + row
             n = load(s, tape[H_ACCELERATION] + row)

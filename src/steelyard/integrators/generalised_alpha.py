@@ -41,6 +41,8 @@ from ..forces.accumulate import accumulate_forces
 from ..forces.drag import add_drag
 from ..kernel import inner
 from ..math.lanes import absolute, any_lane, fma, load, select, splat, store
+from ..math.pointers import axes
+from ..math.vectors import store_coordinates
 from ..model.tape import (
     H_CONSTANTS,
     H_DAMPING,
@@ -153,10 +155,12 @@ class GeneralisedAlpha(Integrator):
 def _fingerprint(tape, s):
     """A number that changes when any position or velocity does."""
     value = splat(0.0)
-    for row in range(3 * tape[H_PARTICLES]):
-        weight = splat(1.0 + 0.37 * row)
-        value = fma(weight, load(s, tape[H_POSITION] + row), value)
-        value = fma(weight + splat(0.1), load(s, tape[H_VELOCITY] + row), value)
+    for p in range(tape[H_PARTICLES]):
+        for axis in range(axes(s)):
+            row = 3 * p + axis
+            weight = splat(1.0 + 0.37 * row)
+            value = fma(weight, load(s, tape[H_POSITION] + row), value)
+            value = fma(weight + splat(0.1), load(s, tape[H_VELOCITY] + row), value)
     return value
 
 
@@ -168,7 +172,7 @@ def _project(tape, s, skip, worlds):
     for _ in range(tape[H_PASSES]):
         for index in range(tape[at]):
             row = tape[at + 1 + UNKNOWN * index + 2]
-            for axis in range(3):
+            for axis in range(axes(s)):
                 store(s, row + axis, zero)
         velocity_rows(tape, s)
         call_stage(tape[H_SADDLE_SOLVE], tape, s, skip, MASSES)
@@ -176,7 +180,7 @@ def _project(tape, s, skip, worlds):
             break
     for index in range(tape[at]):
         k = at + 1 + UNKNOWN * index
-        for axis in range(3):
+        for axis in range(axes(s)):
             row = tape[H_VELOCITY] + tape[k] + axis
             change = select(worlds, load(s, tape[k + 2] + axis), zero)
             store(s, row, load(s, row) + change)
@@ -201,10 +205,7 @@ def _start_accelerations(tape, s, skip, fresh, dt):
         for index in range(tape[at]):
             k = at + 1 + UNKNOWN * index
             x, y, z = load_force(tape, s, k)
-            row = tape[k + 2]
-            store(s, row, x)
-            store(s, row + 1, y)
-            store(s, row + 2, z)
+            store_coordinates(s, tape[k + 2], x, y, z)
         acceleration_rows(tape, s)
         call_stage(tape[H_SADDLE_SOLVE], tape, s, skip, MASSES)
         if not any_lane(take_multipliers(tape, s, fresh)):
@@ -241,10 +242,11 @@ def generalised_alpha_begin(tape, s, skip, part):
     for index in range(tape[at]):
         k = at + 1 + UNKNOWN * index
         inverse = load(s, tape[H_INVERSE_MASS] + tape[k + 1])
-        force = load_force(tape, s, k)
-        for axis in range(3):
+        fx, fy, fz = load_force(tape, s, k)
+        store_coordinates(s, tape[k + 2], fx, fy, fz)
+        for axis in range(axes(s)):
             row = tape[k] + axis
-            q = force[axis]
+            q = load(s, tape[k + 2] + axis)
             if tape[H_IMPULSE] >= 0:
                 q = q + load(s, tape[H_IMPULSE] + row)
             q = q * inverse
@@ -267,7 +269,7 @@ def generalised_alpha_begin(tape, s, skip, part):
     for index in range(tape[at]):
         p = tape[at + 1 + index]
         still = load(s, tape[H_INVERSE_MASS] + p) > splat(0.0)
-        for axis in range(3):
+        for axis in range(axes(s)):
             row = 3 * p + axis
             x = load(s, tape[H_POSITION] + row)
             moved = fma(dt, load(s, tape[H_VELOCITY] + row), x)
@@ -290,13 +292,14 @@ def _motion_rows(tape, s):
     for index in range(tape[at]):
         k = at + 1 + UNKNOWN * index
         mass = load(s, tape[H_MASS] + tape[k + 1])
-        force = load_force(tape, s, k)
+        fx, fy, fz = load_force(tape, s, k)
+        store_coordinates(s, tape[k + 2], fx, fy, fz)
         size = zero
         rounding = zero
         left = zero
-        for axis in range(3):
+        for axis in range(axes(s)):
             row = tape[k] + axis
-            pulled = force[axis]
+            pulled = load(s, tape[k + 2] + axis)
             x = load(s, tape[H_POSITION] + row)
             free = load(s, work + row)
             moved = mass * load(s, work + 3 * count + row)
@@ -339,7 +342,7 @@ def generalised_alpha_solve(tape, s, skip, part):
         add_position_multipliers(tape, s, splat(1.0) / square, active)
         for index in range(tape[at]):
             k = at + 1 + UNKNOWN * index
-            for axis in range(3):
+            for axis in range(axes(s)):
                 row = tape[k] + axis
                 change = select(active, load(s, tape[k + 2] + axis), zero)
                 moved = load(s, work + 3 * count + row) + change
@@ -368,7 +371,7 @@ def _impact(tape, s, skip, worlds):
         # What damping at the step's end left of the impulse.
         damping = load(s, tape[H_DAMPING] + tape[k + 1])
         inverse = inverse / fma(damping, share, splat(1.0))
-        for axis in range(3):
+        for axis in range(axes(s)):
             row = tape[H_VELOCITY] + tape[k] + axis
             part = inverse * share * load(s, tape[H_IMPULSE] + tape[k] + axis)
             store(s, row, load(s, row) - select(worlds, part, zero))
@@ -386,7 +389,7 @@ def generalised_alpha_end(tape, s, skip, part):
     at = tape[H_UNKNOWNS]
     for index in range(tape[at]):
         k = at + 1 + UNKNOWN * index
-        for axis in range(3):
+        for axis in range(axes(s)):
             row = tape[k] + axis
             moved = load(s, work + 3 * count + row)
             v = fma(rate, moved, load(s, work + count + row))

@@ -12,7 +12,8 @@ from __future__ import annotations
 from ..forces import buoyancy, drag, springs
 from ..kernel import inner
 from ..math.lanes import any_lane, fma, load, select, splat, sqrt, store
-from ..math.vectors import dot, load_vector
+from ..math.pointers import axes
+from ..math.vectors import dot, load_coordinates
 from ..model.tape import (
     H_ACCELERATION,
     H_ACTIVE,
@@ -50,9 +51,10 @@ def _add_symmetric(s, target, diagonal, along, x, y, z):
     store(s, target, load(s, target) + fma(ax, x, diagonal))
     store(s, target + 1, fma(ay, x, load(s, target + 1)))
     store(s, target + 2, load(s, target + 2) + fma(ay, y, diagonal))
-    store(s, target + 3, fma(az, x, load(s, target + 3)))
-    store(s, target + 4, fma(az, y, load(s, target + 4)))
-    store(s, target + 5, load(s, target + 5) + fma(az, z, diagonal))
+    if axes(s) == 3:
+        store(s, target + 3, fma(az, x, load(s, target + 3)))
+        store(s, target + 4, fma(az, y, load(s, target + 4)))
+        store(s, target + 5, load(s, target + 5) + fma(az, z, diagonal))
 
 
 @inner
@@ -82,8 +84,8 @@ def add_spring_blocks(tape, s, reach):
     for index in range(tape[at]):
         k = at + 1 + springs.RECORD * index
         j = blocks + 1 + SPRING_BLOCK * index
-        ax, ay, az = load_vector(s, tape[k])
-        bx, by, bz = load_vector(s, tape[k + 1])
+        ax, ay, az = load_coordinates(s, tape[k])
+        bx, by, bz = load_coordinates(s, tape[k + 1])
         x = ax - bx
         y = ay - by
         z = az - bz
@@ -110,16 +112,17 @@ def add_spring_blocks(tape, s, reach):
         az = along * z
         store(s, target, load(s, target) - fma(ax, x, across))
         store(s, target + 4, load(s, target + 4) - fma(ay, y, across))
-        store(s, target + 8, load(s, target + 8) - fma(az, z, across))
         xy = ax * y
-        xz = ax * z
-        yz = ay * z
         store(s, target + 1, load(s, target + 1) - xy)
-        store(s, target + 2, load(s, target + 2) - xz)
         store(s, target + 3, load(s, target + 3) - xy)
-        store(s, target + 5, load(s, target + 5) - yz)
-        store(s, target + 6, load(s, target + 6) - xz)
-        store(s, target + 7, load(s, target + 7) - yz)
+        if axes(s) == 3:
+            xz = ax * z
+            yz = ay * z
+            store(s, target + 8, load(s, target + 8) - fma(az, z, across))
+            store(s, target + 2, load(s, target + 2) - xz)
+            store(s, target + 5, load(s, target + 5) - yz)
+            store(s, target + 6, load(s, target + 6) - xz)
+            store(s, target + 7, load(s, target + 7) - yz)
 
 
 @inner
@@ -129,8 +132,8 @@ def add_drag_blocks(tape, s, reach):
     at = tape[H_DRAGS]
     for index in range(tape[at]):
         k = at + 1 + drag.RECORD * index
-        vx, vy, vz = load_vector(s, tape[k])
-        wx, wy, wz = load_vector(s, tape[k + 4])
+        vx, vy, vz = load_coordinates(s, tape[k])
+        wx, wy, wz = load_coordinates(s, tape[k + 4])
         x = vx - wx
         y = vy - wy
         z = vz - wz
@@ -174,13 +177,13 @@ def load_force(tape, s, k):
     """Force on an unknown's particle at the state at hand, damping and constant acceleration in it."""
     mass = load(s, tape[H_MASS] + tape[k + 1])
     damping = load(s, tape[H_DAMPING] + tape[k + 1])
-    ax, ay, az = load_vector(s, tape[H_ACCELERATION] + tape[k])
-    vx, vy, vz = load_vector(s, tape[H_VELOCITY] + tape[k])
+    ax, ay, az = load_coordinates(s, tape[H_ACCELERATION] + tape[k])
+    vx, vy, vz = load_coordinates(s, tape[H_VELOCITY] + tape[k])
     x = mass * (ax - damping * vx)
     y = mass * (ay - damping * vy)
     z = mass * (az - damping * vz)
     if tape[H_FORCED] != 0:
-        fx, fy, fz = load_vector(s, tape[H_FORCE] + tape[k])
+        fx, fy, fz = load_coordinates(s, tape[H_FORCE] + tape[k])
         x = x + fx
         y = y + fy
         z = z + fz

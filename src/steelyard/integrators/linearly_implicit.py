@@ -28,6 +28,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from ..math.lanes import fma, load, splat, store
+from ..math.pointers import axes
 from ..model.tape import H_ACTIVE, H_DT, H_PARTICLES, H_POSITION, H_REACH, H_VELOCITY, H_WORK
 from ..solvers.base import Solver
 from ..stage import stage
@@ -79,10 +80,12 @@ def second_leg_begin(tape, s, skip, part):
     grown = ahead / reach
     start = tape[H_WORK]
     count = 3 * tape[H_PARTICLES]
-    for row in range(count):
-        v = load(s, tape[H_VELOCITY] + row)
-        u = load(s, start + count + row)
-        x = fma(ahead, v, load(s, start + row))
-        store(s, start + row, x)
-        store(s, start + count + row, fma(grown, v - u, u))
-        store(s, tape[H_POSITION] + row, fma(reach, v, x))
+    for p in range(tape[H_PARTICLES]):
+        for axis in range(axes(s)):
+            row = 3 * p + axis
+            v = load(s, tape[H_VELOCITY] + row)
+            u = load(s, start + count + row)
+            x = fma(ahead, v, load(s, start + row))
+            store(s, start + row, x)
+            store(s, start + count + row, fma(grown, v - u, u))
+            store(s, tape[H_POSITION] + row, fma(reach, v, x))

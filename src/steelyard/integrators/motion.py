@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from ..kernel import inner
 from ..math.lanes import fma, load, splat, store
+from ..math.pointers import axes
 from ..model.tape import (
     H_ACCELERATION,
     H_CONSTRAINED,
@@ -29,7 +30,7 @@ def kick(tape, s, dt):
     for index in range(tape[at]):
         p = tape[at + 1 + index]
         inverse = load(s, tape[H_INVERSE_MASS] + p)
-        for component in range(3):
+        for component in range(axes(s)):
             row = 3 * p + component
             a = load(s, tape[H_ACCELERATION] + row)
             if tape[H_FORCED] != 0:
@@ -44,7 +45,7 @@ def damp(tape, s):
     if tape[H_DAMPED] != 0:
         for p in range(tape[H_PARTICLES]):
             factor = load(s, tape[H_DAMPING] + p)
-            for component in range(3):
+            for component in range(axes(s)):
                 v = tape[H_VELOCITY] + 3 * p + component
                 store(s, v, load(s, v) * factor)
 
@@ -56,7 +57,7 @@ def drift(tape, s, dt):
     constrained = tape[H_CONSTRAINED] != 0
     for index in range(tape[at]):
         p = tape[at + 1 + index]
-        for component in range(3):
+        for component in range(axes(s)):
             row = 3 * p + component
             x = load(s, tape[H_POSITION] + row)
             moved = fma(dt, load(s, tape[H_VELOCITY] + row), x)
@@ -74,7 +75,7 @@ def add_stage_velocity(tape, s, dt):
     for index in range(tape[at]):
         p = tape[at + 1 + index]
         weight = load(s, tape[H_INVERSE_MASS] + p) * inverse_dt
-        for component in range(3):
+        for component in range(axes(s)):
             row = 3 * p + component
             v = tape[H_VELOCITY] + row
             store(s, v, fma(weight, load(s, tape[H_IMPULSE] + row), load(s, v)))
@@ -83,5 +84,7 @@ def add_stage_velocity(tape, s, dt):
 @inner
 def keep_free_velocity(tape, s):
     """Free rows = velocities, from which the velocity stage starts."""
-    for row in range(3 * tape[H_PARTICLES]):
-        store(s, tape[H_FREE] + row, load(s, tape[H_VELOCITY] + row))
+    for p in range(tape[H_PARTICLES]):
+        for axis in range(axes(s)):
+            row = 3 * p + axis
+            store(s, tape[H_FREE] + row, load(s, tape[H_VELOCITY] + row))

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING
 
 from ..forces.accumulate import sum_forces
 from ..math.lanes import absolute, any_lane, fma, load, select, splat, store
-from ..math.vectors import load_vector, store_vector
+from ..math.pointers import axes
+from ..math.vectors import load_coordinates, store_coordinates
 from ..model.tape import (
     H_ACTIVE,
     H_DT,
@@ -53,12 +54,14 @@ def one_leg_begin(tape, s, skip, part):
     store(s, tape[H_ACTIVE], splat(1.0))
     start = tape[H_WORK]
     count = 3 * tape[H_PARTICLES]
-    for row in range(count):
-        x = load(s, tape[H_POSITION] + row)
-        v = load(s, tape[H_VELOCITY] + row)
-        store(s, start + row, x)
-        store(s, start + count + row, v)
-        store(s, tape[H_POSITION] + row, fma(reach, v, x))
+    for p in range(tape[H_PARTICLES]):
+        for axis in range(axes(s)):
+            row = 3 * p + axis
+            x = load(s, tape[H_POSITION] + row)
+            v = load(s, tape[H_VELOCITY] + row)
+            store(s, start + row, x)
+            store(s, start + count + row, v)
+            store(s, tape[H_POSITION] + row, fma(reach, v, x))
 
 
 @stage
@@ -75,18 +78,18 @@ def one_leg_correct(tape, s, skip, part):
             k = at + 1 + UNKNOWN * index
             mass = load(s, tape[H_MASS] + tape[k + 1])
             x, y, z = load_force(tape, s, k)
-            vx, vy, vz = load_vector(s, tape[H_VELOCITY] + tape[k])
-            ux, uy, uz = load_vector(s, before + tape[k])
+            vx, vy, vz = load_coordinates(s, tape[H_VELOCITY] + tape[k])
+            ux, uy, uz = load_coordinates(s, before + tape[k])
             x = fma(mass, ux - vx, reach * x)
             y = fma(mass, uy - vy, reach * y)
             z = fma(mass, uz - vz, reach * z)
-            store_vector(s, tape[k + 2], x, y, z)
+            store_coordinates(s, tape[k + 2], x, y, z)
         solve_motion(tape, s, skip)
         change = zero
         far = zero
         for index in range(tape[at]):
             k = at + 1 + UNKNOWN * index
-            for component in range(3):
+            for component in range(axes(s)):
                 row = tape[k] + component
                 more = select(active, load(s, tape[k + 2] + component), zero)
                 v = load(s, tape[H_VELOCITY] + row) + more
@@ -118,8 +121,10 @@ def one_leg_end(tape, s, skip, part):
     outwards = dt / load(s, tape[H_REACH])
     start = tape[H_WORK]
     before = start + 3 * tape[H_PARTICLES]
-    for row in range(3 * tape[H_PARTICLES]):
-        v = load(s, tape[H_VELOCITY] + row)
-        u = load(s, before + row)
-        store(s, tape[H_POSITION] + row, fma(dt, v, load(s, start + row)))
-        store(s, tape[H_VELOCITY] + row, fma(outwards, v - u, u))
+    for p in range(tape[H_PARTICLES]):
+        for axis in range(axes(s)):
+            row = 3 * p + axis
+            v = load(s, tape[H_VELOCITY] + row)
+            u = load(s, before + row)
+            store(s, tape[H_POSITION] + row, fma(dt, v, load(s, start + row)))
+            store(s, tape[H_VELOCITY] + row, fma(outwards, v - u, u))

@@ -20,6 +20,7 @@ from typing import ClassVar
 
 from ..forces.accumulate import sum_forces
 from ..math.lanes import fma, load, splat, store
+from ..math.pointers import axes
 from ..model.tape import (
     H_ACCELERATION,
     H_DAMPED,
@@ -74,7 +75,7 @@ def rk4_part(tape, s, skip, part):
     total = start + 2 * count
     for p in range(tape[H_PARTICLES]):
         inverse = load(s, tape[H_INVERSE_MASS] + p)
-        for component in range(3):
+        for component in range(axes(s)):
             row = 3 * p + component
             x = load(s, tape[H_POSITION] + row)
             v = load(s, tape[H_VELOCITY] + row)

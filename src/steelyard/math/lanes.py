@@ -6,6 +6,9 @@ IEEE operation per world, whatever the other seven hold: results cannot depend o
 a batch, and there is no remainder loop. ``fma`` rounds once; plain ``a * b + c`` is never contracted.
 
 Lane values exist only inside kernels. LLVM maps them to AVX-512, AVX2, SSE2 or NEON registers.
+
+``nil`` is the type of what is zero in every world, the third coordinate of a planar scene: what is added to it stays
+as it is, what is multiplied by it is nil, and no instruction is left of either.
 """
 
 from __future__ import annotations
@@ -16,7 +19,8 @@ from typing import Any
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
-from numba.core.extending import intrinsic, lower_builtin, models, register_model
+from numba.core.extending import intrinsic, lower_builtin, lower_cast, models, register_model
+from numba.core.typeconv import Conversion
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 
 from .pointers import FIRST, LANES
@@ -46,8 +50,27 @@ class MaskType(types.Type):
         super().__init__(name=f"Mask{LANES}")
 
 
+class NilType(types.Type):
+    """Zero in every world of every block."""
+
+    def __init__(self) -> None:
+        super().__init__(name="Nil")
+
+    def can_convert_to(self, typingctx: Any, other: Any) -> Any:
+        """To a lane vector of zeros."""
+        return Conversion.safe if isinstance(other, LaneType) else None
+
+
 lane = LaneType()
 mask = MaskType()
+nil = NilType()
+
+register_model(NilType)(models.OpaqueModel)
+
+
+@lower_cast(NilType, LaneType)
+def _zeros(context: Any, builder: Any, source: Any, target: Any, value: Any) -> Any:
+    return ir.Constant(_DOUBLES, None)
 
 
 @register_model(LaneType)
@@ -87,6 +110,30 @@ def store(typing_context: Any, rows: Any, row: Any, value: Any) -> Any:
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         builder.store(args[2], _row(builder, args[0], _entry(builder, args[1])), align=64)
+        return context.get_dummy_value()
+
+    return types.void(rows, types.int64, lane), codegen
+
+
+@_operation
+def load_z(typing_context: Any, rows: Any, row: Any) -> Any:
+    """``load`` of a third coordinate: nil in a planar scene."""
+    if rows.axes == 2:
+        return nil(rows, types.int64), lambda context, *_: context.get_dummy_value()
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return builder.load(_row(builder, args[0], _entry(builder, args[1])), align=64)
+
+    return lane(rows, types.int64), codegen
+
+
+@_operation
+def store_z(typing_context: Any, rows: Any, row: Any, value: Any) -> Any:
+    """``store`` of a third coordinate: nothing in a planar scene."""
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        if rows.axes == 3:
+            builder.store(args[2], _row(builder, args[0], _entry(builder, args[1])), align=64)
         return context.get_dummy_value()
 
     return types.void(rows, types.int64, lane), codegen
@@ -140,6 +187,10 @@ def _llvm(name: str, count: int) -> Any:
 @_operation
 def fma(typing_context: Any, a: Any, b: Any, c: Any) -> Any:
     """a * b + c, rounded once."""
+    if nil in (a, b):
+        return c(a, b, c), lambda context, builder, sig, args: args[2]
+    if c == nil:
+        return lane(a, b, c), lambda context, builder, sig, args: builder.fmul(*args[:2])
     return lane(lane, lane, lane), _llvm("fma", 3)
 
 
@@ -158,6 +209,8 @@ def absolute(typing_context: Any, a: Any) -> Any:
 @_operation
 def select(typing_context: Any, condition: Any, yes: Any, no: Any) -> Any:
     """``yes`` in the lanes where the condition holds, ``no`` in the others."""
+    if (yes, no) == (nil, nil):
+        return nil(mask, nil, nil), lambda context, *_: context.get_dummy_value()
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         return builder.select(*args)
@@ -179,6 +232,15 @@ def any_lane(typing_context: Any, condition: Any) -> Any:
 _INDEX_ARITHMETIC = (operator.add, operator.sub, operator.mul)
 
 
+def _with_nil(function: Any, a: types.Type, b: types.Type) -> types.Type | None:
+    """Type of a sum, difference, product or quotient one of whose parts is nil; None for what divides by it."""
+    if function is operator.mul or a == b:
+        return None if function is operator.truediv else nil
+    if function is operator.truediv:
+        return nil if a == nil else None
+    return lane
+
+
 def _binary(function: Any, instruction: str, operand: types.Type) -> None:
     @infer_global(function)
     class _Template(AbstractTemplate):
@@ -187,6 +249,9 @@ def _binary(function: Any, instruction: str, operand: types.Type) -> None:
         def generic(self, args: Any, kws: Any) -> Any:
             if args == (operand, operand):
                 return signature(operand, operand, operand)
+            if nil in args and operand == lane and set(args) <= {lane, nil}:
+                result = _with_nil(function, *args)
+                return None if result is None else signature(result, *args)
             if args == (types.int64, types.int64) and function in _INDEX_ARITHMETIC:
                 return signature(types.int64, types.int64, types.int64)
             return None
@@ -194,6 +259,34 @@ def _binary(function: Any, instruction: str, operand: types.Type) -> None:
     @lower_builtin(function, operand, operand)
     def _lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         return getattr(builder, instruction)(*args)
+
+    @lower_builtin(function, lane, nil)
+    @lower_builtin(function, nil, lane)
+    @lower_builtin(function, nil, nil)
+    def _lower_nil(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        if sig.return_type == nil:
+            return context.get_dummy_value()
+        if sig.args[1] == nil:
+            return args[0]
+        return args[1] if function is operator.add else builder.fneg(args[1])
+
+
+@infer_global(operator.neg)
+class _Negated(AbstractTemplate):
+    metadata = FIRST
+
+    def generic(self, args: Any, kws: Any) -> Any:
+        return signature(args[0], args[0]) if args[0] in (lane, nil) else None
+
+
+@lower_builtin(operator.neg, lane)
+def _negate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    return builder.fneg(args[0])
+
+
+@lower_builtin(operator.neg, nil)
+def _negate_nil(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    return args[0]
 
 
 def _comparison(function: Any, symbol: str) -> None:

@@ -3,6 +3,9 @@
 ``Tape`` points to integers that no kernel writes, ``Integers`` and ``Doubles`` to what kernels work on. They exist
 only inside kernels, made by ``tape_at``, ``integers_at`` and ``doubles_at`` from an address. Indices
 are not checked; ``doubles[row, k]`` is entry k of a row of LANES.
+
+``PlanarDoubles`` is the scratch of a planar scene: the same rows, but kernels compiled for it leave out
+whatever concerns the third coordinate (``axes``, ``lanes.load_z``).
 """
 
 from __future__ import annotations
@@ -27,9 +30,12 @@ _INTEGER = ir.IntType(64)
 class Pointer(types.Type):
     """Address of entries of one type."""
 
-    def __init__(self, name: str, entry: types.Type, *, constant: bool = False) -> None:
+    def __init__(
+        self, name: str, entry: types.Type, *, constant: bool = False, axes: int = 3
+    ) -> None:
         self.entry = entry
         self.constant = constant
+        self.axes = axes
         super().__init__(name=name)
 
 
@@ -44,6 +50,7 @@ register_model(Pointer)(_PointerModel)
 Tape = Pointer("Tape", types.int64, constant=True)
 Integers = Pointer("Integers", types.int64)
 Doubles = Pointer("Doubles", types.float64)
+PlanarDoubles = Pointer("PlanarDoubles", types.float64, axes=2)
 
 _PAIR = types.UniTuple(types.int64, 2)
 
@@ -115,6 +122,25 @@ def _maker(pointer: Pointer) -> Any:
 tape_at = _maker(Tape)
 integers_at = _maker(Integers)
 doubles_at = _maker(Doubles)
+planar_doubles_at = _maker(PlanarDoubles)
+
+
+def _axes(typing_context: Any, rows: Any) -> Any:
+    """Number of coordinates that a scene moves in, known when a kernel is compiled."""
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return _INTEGER(rows.axes)
+
+    return types.int64(rows), codegen
+
+
+def _spatial(typing_context: Any, rows: Any) -> Any:
+    """The same rows, for code to which three is no number of coordinates."""
+    return Doubles(rows), lambda context, builder, sig, args: args[0]
+
+
+axes: Any = intrinsic(_axes)
+spatial: Any = intrinsic(_spatial)
 
 
 def _offset(typing_context: Any, pointer: Any, entries: Any) -> Any:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..kernel import inner
-from .lanes import fma, load, select, splat, sqrt, store
+from .lanes import fma, load, load_z, select, splat, sqrt, store, store_z
 
 
 @inner
@@ -18,6 +18,28 @@ def store_vector(s, row, x, y, z):
     store(s, row, x)
     store(s, row + 1, y)
     store(s, row + 2, z)
+
+
+@inner
+def load_coordinates(s, row):
+    """Position, velocity or force: three rows, of which a planar scene has two."""
+    return load(s, row), load(s, row + 1), load_z(s, row + 2)
+
+
+@inner
+def store_coordinates(s, row, x, y, z):
+    """Position, velocity or force."""
+    store(s, row, x)
+    store(s, row + 1, y)
+    store_z(s, row + 2, z)
+
+
+@inner
+def add_scaled(s, row, factor, x, y, z):
+    """Position, velocity or force += factor times a vector."""
+    store(s, row, fma(factor, x, load(s, row)))
+    store(s, row + 1, fma(factor, y, load(s, row + 1)))
+    store_z(s, row + 2, fma(factor, z, load_z(s, row + 2)))
 
 
 @inner

@@ -355,7 +355,10 @@ class Compiler:
         solver = self.method.solver
         held = solver if self.header["constrained"] else None
         recipe = self.method.integrator.recipe(held, self._acting())
-        self.sections["recipe"] = [word for stage, part in recipe for word in (stage.address, part)]
+        planar = self.scene.planar
+        self.sections["recipe"] = [
+            word for stage, part in recipe for word in (stage.address(planar=planar), part)
+        ]
         self.model.recipe = recipe
         self.header["hasty"] = int(bool(held and held.sparse and self.contacts))
         self.header["contacts_most"] = most = len(self.links) + len(self.contacts)

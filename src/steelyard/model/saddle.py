@@ -3,15 +3,16 @@
     [M - r D - r^2 K + geometric stiffness   J^T]
     [J                                       0  ]
 
-Unknowns are the movable particles, three each, links, one each, and riders, three each. The order is that of the fewest
-neighbours left, with one rule: a link or rider comes after all of its particles. What is eliminated by then
-holds whole rows of J, so no pivot can vanish unless the links themselves depend on each other; after but one of its
-particles is cheaper by 2/7 and meets a pivot of zero in a straight chain.
+Unknowns are the movable particles, three each (two in a planar scene), links, one each, and riders, as particles. The
+order is that of the fewest neighbours left, with one rule: a link or rider comes after all of its particles. What is
+eliminated by then holds whole rows of J, so no pivot can vanish unless the links themselves depend on each other; after
+but one of its particles is cheaper by 2/7 and meets a pivot of zero in a straight chain.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -65,7 +66,7 @@ class Saddle(Stiffness):
         self._diagonals()
         self._links()
         self._riders()
-        self.c.header["saddle_solve"] = solve_saddle.address
+        self.c.header["saddle_solve"] = solve_saddle.address(planar=self.c.scene.planar)
 
     def _movable(self, thing: Any) -> list[int]:
         """Blocks of the movable particles of a link or rider, a before b."""
@@ -81,7 +82,8 @@ class Saddle(Stiffness):
         c = self.c
         held = [*c.links, *c.riders]
         members = [set(self._movable(thing)) for thing in held]
-        self.width = [3] * self.count + [1] * len(c.links) + [3] * len(c.riders)
+        axes = c.scene.axes
+        self.width = [axes] * self.count + [1] * len(c.links) + [axes] * len(c.riders)
         adjacency: list[set[int]] = [set() for _ in self.width]
 
         def couple(some: Iterable[int]) -> None:
@@ -119,7 +121,7 @@ class Saddle(Stiffness):
         sprung = self._sprung()
         for position, block in enumerate(self.order):
             width = self.width[block]
-            own = c.take(6 if width == 3 else 1)
+            own = c.take(6 if width > 1 else 1)
             self.diagonal[position] = own
             for row in range(width):
                 i = self.first[position] + row
@@ -129,9 +131,9 @@ class Saddle(Stiffness):
             for other in self.pattern[position]:
                 if (position, other) in sprung:
                     self.a[position, other] = c.take(9)
-                    for k in range(9):
-                        i, j = self.first[position] + k // 3, self.first[other] + k % 3
-                        self.entry[i, j] = (self.a[position, other] + k, -1)
+                    for row, column in product(range(width), repeat=2):
+                        i, j = self.first[position] + row, self.first[other] + column
+                        self.entry[i, j] = (self.a[position, other] + 3 * row + column, -1)
             for row in range(width):
                 i = self.first[position] + row
                 for j in self._columns(position):
@@ -221,7 +223,8 @@ class Saddle(Stiffness):
             couplings = [self.spare] * 3
             if min(some) >= 0:
                 i, j = sorted((self.first[self.place[p]] for p in some), reverse=True)
-                couplings = [self.entry[i + axis, j + axis][0] for axis in range(3)]
+                for axis in range(c.scene.axes):
+                    couplings[axis] = self.entry[i + axis, j + axis][0]
             diagonal = self.diagonal[self.place[block]]
             records += [self._right(block), diagonal, *rows, *diagonals, *couplings, limits[k]]
         c.sections["saddle_links"] = records
@@ -239,7 +242,8 @@ class Saddle(Stiffness):
                 rows = [-1] * 3
                 if p.movable:
                     j = self.first[self.place[self.block[c.of(p)]]]
-                    rows = [self.entry[i + axis, j + axis][0] for axis in range(3)]
+                    for axis in range(c.scene.axes):
+                        rows[axis] = self.entry[i + axis, j + axis][0]
                 records += rows
         c.sections["saddle_riders"] = records
         c.counts["saddle_riders"] = len(c.riders)

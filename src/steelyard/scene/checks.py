@@ -239,6 +239,21 @@ def vector(owner: str, name: str, value: Any) -> tuple[float, float, float]:
     return x, y, z
 
 
+#: Names under which things hold vectors.
+VECTORS = (
+    "position", "velocity", "acceleration", "gravity", "anchor", "normal", "start", "end", "wind",
+)  # fmt: skip
+
+
+def in_plane(owner: str, name: str, value: np.ndarray) -> None:
+    """Refuse vectors, (3 n,) or (3 n, worlds), with a part across the plane of a planar scene."""
+    across = np.asarray(value, dtype=np.float64)[2::3]
+    remedy = "Move it into the plane, or use a Scene that is not planar."
+    # What is not a number is flagged elsewhere, world by world.
+    bad = (across != 0.0) & ~np.isnan(across)
+    _refuse_first(owner, f"{name} along z", across, bad, "0 in a planar scene", remedy)
+
+
 def vectors(thing: Any, *names: str) -> None:
     """Make attributes of a thing tuples of three finite floats.
 

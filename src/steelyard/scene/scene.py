@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any, TypeVar
 
+import numpy as np
+
 from . import checks
 from .contacts import ContactGenerator, Ground, LinePlatform, check_thickness
 from .forces import (
@@ -56,18 +58,32 @@ class Scene:
 
     Args:
         gravity: acceleration [m/s^2] of every particle that does not bring its own.
+        planar: all that it holds lies and moves in the plane z = 0, and kernels step two coordinates instead of three;
+            arrays keep the third, which stays 0 whatever is written to it.
+
+    Raises:
+        ValueError: gravity is not finite, or a planar scene has some along z.
     """
 
-    def __init__(self, *, gravity: checks.Vector = (0.0, -9.81, 0.0)) -> None:
+    def __init__(self, *, gravity: checks.Vector = (0.0, -9.81, 0.0), planar: bool = False) -> None:
         self.gravity = checks.vector("Scene", "gravity", gravity)
+        self.planar = bool(planar)
+        if self.planar:
+            checks.in_plane("Scene", "gravity", np.array(self.gravity))
         self.things: list[Any] = []
+
+    @property
+    def axes(self) -> int:
+        """Number of coordinates that particles move in."""
+        return 2 if self.planar else 3
 
     def add(self, thing: Thing) -> Thing:
         """Add a particle, link, rider, contact generator or force, and return it.
 
         Raises:
             TypeError: not something that a scene holds.
-            ValueError: already in this scene, or it refers to a particle that is not.
+            ValueError: already in this scene, it refers to a particle that is not, or it leaves the plane of a planar
+                scene.
         """
         name = type(thing).__name__
         if not isinstance(thing, KINDS):
@@ -91,6 +107,11 @@ class Scene:
                 "the limit is 1 per particle, since its solution is exact only alone. Use "
                 "AnchoredSpring."
             )
+        if self.planar:
+            for vector in checks.VECTORS:
+                value = getattr(thing, vector, None)
+                if np.ndim(value) == 1:  # a float's gravity is a number
+                    checks.in_plane(name, vector, np.array(value))
         self.things.append(thing)
         return thing
 
@@ -138,7 +159,7 @@ class Scene:
 
     def copy(self) -> Scene:
         """A scene with the same things; adding to one leaves the other."""
-        other = Scene(gravity=self.gravity)
+        other = Scene(gravity=self.gravity, planar=self.planar)
         other.things = list(self.things)
         return other
 
@@ -153,4 +174,5 @@ class Scene:
     def __repr__(self) -> str:
         counts = {kind.__name__: len(self.of(kind)) for kind in KINDS}
         parts = ", ".join(f"{count} {name}" for name, count in counts.items() if count)
-        return f"Scene({parts or 'empty'}, gravity={self.gravity})"
+        planar = ", planar" if self.planar else ""
+        return f"Scene({parts or 'empty'}, gravity={self.gravity}{planar})"

@@ -7,6 +7,7 @@ from ..constraints.links import link_half_square, link_multiplier, link_rate
 from ..constraints.riders import DECK, HEAD, rider_multiplier
 from ..kernel import inner
 from ..math.lanes import absolute, any_lane, load, select, splat, store
+from ..math.pointers import axes
 from ..model.tape import (
     CONTACT,
     H_CONTACTS,
@@ -90,7 +91,7 @@ def withdraw(tape, s, skip, velocity, worlds, single):
     for _ in range(tape[tape[H_RIDERS]]):
         row = rider_multiplier(tape, at, velocity)
         old = tape[at + 9] + tape[at + 6] + 3
-        for axis in range(3):
+        for axis in range(axes(s)):
             store(s, row + axis, select(worlds, load(s, old + axis), load(s, row + axis)))
         at += HEAD + DECK * tape[at + 6]
     at = tape[H_CONTACTS]

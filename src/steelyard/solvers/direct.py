@@ -26,6 +26,7 @@ from ..constraints.links import link_multiplier
 from ..constraints.riders import DECK, HEAD, rider_multiplier, rider_offset, rider_slip
 from ..kernel import inner
 from ..math.lanes import absolute, any_lane, load, select, splat, store
+from ..math.pointers import axes, spatial
 from ..model.tape import (
     CONTACT,
     FRESH,
@@ -204,7 +205,7 @@ def _right_rows(tape, s, velocity, dt):
         allowed = load(s, tape[H_TOLERANCE])
         if velocity:
             allowed = allowed / dt
-        for axis in range(3):
+        for axis in range(axes(s)):
             error = rider_slip(s, tape, at, axis) if velocity else rider_offset(s, tape, at, axis)
             store(s, tape[H_RIGHT] + tape[at + 4] + axis, zero - error)
             bad = bad | (absolute(error) > allowed)
@@ -228,7 +229,7 @@ def _accept(tape, s, skip, velocity, worlds):
     at = tape[H_RIDERS] + 1
     for _ in range(tape[tape[H_RIDERS]]):
         row = rider_multiplier(tape, at, velocity)
-        for axis in range(3):
+        for axis in range(axes(s)):
             store(s, tape[at + 9] + tape[at + 6] + 3 + axis, load(s, row + axis))
             change = load(s, tape[H_RIGHT] + tape[at + 4] + axis)
             store(s, row + axis, load(s, row + axis) + select(worlds, change, zero))
@@ -312,7 +313,7 @@ def solve_stage(tape, s, skip, velocity, dt, target, hasty):
             factorise_contacts(tape, s, skip, softness)
         if contacts > 0:
             _contact_rows(tape, s, skip, velocity)
-        block_ldl.forward(tape, tape[H_FORWARD], s, skip)
+        block_ldl.forward(tape, tape[H_FORWARD], spatial(s), skip)
         if contacts > 0:
             first = turn == 0
             stuck = bad & solve_contacts(tape, s, skip, velocity, allowed, softness, first, hasty)
@@ -320,7 +321,7 @@ def solve_stage(tape, s, skip, velocity, dt, target, hasty):
                 store(s, tape[H_GIVEN_UP], select(stuck, splat(1.0), load(s, tape[H_GIVEN_UP])))
                 bad = bad & (load(s, tape[H_GIVEN_UP]) < half)
                 stuck = zero > zero
-        block_ldl.backward(tape, tape[H_BACKWARD], s, skip)
+        block_ldl.backward(tape, tape[H_BACKWARD], spatial(s), skip)
         _accept(tape, s, skip, velocity, bad)
         _apply(tape, s, skip, velocity, target, bad)
         if velocity and tape[H_CABLES] == 0 and not any_lane(stuck):

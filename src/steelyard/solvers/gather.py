@@ -7,6 +7,7 @@ from ..constraints.links import link_impulses, link_multiplier
 from ..constraints.riders import DECK, HEAD, rider_impulses, rider_multiplier
 from ..kernel import inner
 from ..math.lanes import fma, load, splat, store
+from ..math.pointers import axes
 from ..model.tape import (
     CONTACT,
     H_CONTACTS,
@@ -30,7 +31,7 @@ def clear_velocity_multipliers(tape, s):
         store(s, link_multiplier(tape, at + 1 + LINK * index, True), zero)
     at = tape[H_RIDERS] + 1
     for _ in range(tape[tape[H_RIDERS]]):
-        for axis in range(3):
+        for axis in range(axes(s)):
             store(s, rider_multiplier(tape, at, True) + axis, zero)
         at += HEAD + DECK * tape[at + 6]
     at = tape[H_CONTACTS]
@@ -56,7 +57,7 @@ def gather(tape, s, skip, velocity, target):
     for index in range(tape[at]):
         p = tape[at + 1 + index]
         inverse = load(s, tape[H_INVERSE_MASS] + p)
-        for component in range(3):
+        for component in range(axes(s)):
             row = 3 * p + component
             part = load(s, tape[H_IMPULSE] + row)
             store(s, target + row, fma(inverse, part, load(s, tape[H_FREE] + row)))

@@ -15,6 +15,7 @@ from ..constraints.links import link_half_square, link_multiplier, link_rate
 from ..constraints.riders import DECK, HEAD, rider_multiplier, rider_offset, rider_slip
 from ..kernel import inner
 from ..math.lanes import absolute, fma, load, select, splat, sqrt, store
+from ..math.pointers import axes
 from ..model.tape import (
     CONTACT,
     H_CONTACTS,
@@ -53,7 +54,7 @@ class GaussSeidel(Solver):
 @inner
 def _push(s, row, weight, d, change, sign):
     """Add an impulse ``change`` times the vector at ``d`` to a position or velocity."""
-    for component in range(3):
+    for component in range(axes(s)):
         value = load(s, row + component)
         part = weight * load(s, d + component) * change
         store(s, row + component, value + sign * part)
@@ -74,7 +75,7 @@ def _sweep_links(tape, s, velocity):
         a = tape[link + first]
         b = tape[link + first + 1]
         slope = zero
-        for component in range(3):
+        for component in range(axes(s)):
             now = load(s, d + component)
             if not velocity:
                 now = load(s, a + component) - load(s, b + component)
@@ -113,7 +114,7 @@ def sweep_riders(tape, s, velocity):
             weight = load(s, tape[at + 9] + k)
             total = fma(weight * weight, load(s, tape[at + HEAD + DECK * k + 3]), total)
         place = 1 if velocity else 0
-        for axis in range(3):
+        for axis in range(axes(s)):
             error = rider_slip(s, tape, at, axis) if velocity else rider_offset(s, tape, at, axis)
             change = zero - error / total
             row = rider_multiplier(tape, at, velocity) + axis

@@ -9,7 +9,15 @@ from __future__ import annotations
 
 from ..kernel import inner
 from ..math.lanes import fma, load, splat, store
-from ..math.vectors import cross, load_vector, store_vector, symmetric_product
+from ..math.pointers import spatial
+from ..math.vectors import (
+    cross,
+    dot,
+    load_coordinates,
+    load_vector,
+    store_vector,
+    symmetric_product,
+)
 from ..model.tape import (
     H_FACTOR,
     H_LINK_COUPLINGS,
@@ -124,19 +132,15 @@ def _assemble(tape, s, skip):
     at = tape[H_LINK_DIAGONALS]
     for index in range(tape[at]):
         k = at + 1 + 4 * index
-        d = tape[k + 1]
-        square = load(s, d) * load(s, d)
-        square = fma(load(s, d + 1), load(s, d + 1), square)
-        square = fma(load(s, d + 2), load(s, d + 2), square)
+        x, y, z = load_coordinates(s, tape[k + 1])
+        square = dot(x, y, z, x, y, z)
         store(s, tape[k], square * (load(s, tape[k + 2]) + load(s, tape[k + 3])))
     at = tape[H_LINK_COUPLINGS]
     for index in range(tape[at]):
         k = at + 1 + 5 * index
-        d = tape[k + 1]
-        e = tape[k + 2]
-        product = load(s, d) * load(s, e)
-        product = fma(load(s, d + 1), load(s, e + 1), product)
-        product = fma(load(s, d + 2), load(s, e + 2), product)
+        dx, dy, dz = load_coordinates(s, tape[k + 1])
+        ex, ey, ez = load_coordinates(s, tape[k + 2])
+        product = dot(dx, dy, dz, ex, ey, ez)
         weight = load(s, tape[k + 3]) * load(s, tape[k + 4])
         store(s, tape[k], fma(weight, product, load(s, tape[k])))
     at = tape[H_POINT_DIAGONALS]
@@ -195,7 +199,7 @@ def _factorise(tape, s, skip):
     for index in range(tape[at]):
         k = at + 1 + 2 * index
         store(s, tape[k], load(s, tape[k + 1]))
-    block_ldl.factor(tape, tape[H_FACTOR], s, skip)
+    block_ldl.factor(tape, tape[H_FACTOR], spatial(s), skip)
     at = tape[H_LINKS]
     for index in range(tape[at]):
         slot = tape[at + 1 + LINK * index + 15]

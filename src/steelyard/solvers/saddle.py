@@ -20,6 +20,7 @@ from ..integrators.implicit import (
 )
 from ..kernel import inner
 from ..math.lanes import fma, load, select, splat, store
+from ..math.pointers import axes
 from ..model.tape import (
     H_BACKWARD,
     H_CONSTANTS,
@@ -74,7 +75,7 @@ def _links(tape, s, square):
         taut = load(s, tape[link + 15])
         store(s, tape[k + 1], taut - splat(1.0))
         d = tape[link + 13]
-        for axis in range(3):
+        for axis in range(axes(s)):
             part = taut * load(s, d + axis)
             if tape[k + 2] >= 0:
                 store(s, tape[k + 2] + axis, part)
@@ -83,7 +84,7 @@ def _links(tape, s, square):
         pull = square * load(s, tape[link + 12]) * taut
         lowest = load(s, tape[k + 9])
         pull = select(pull > lowest, pull, lowest)
-        for axis in range(3):
+        for axis in range(axes(s)):
             own = axis * (axis + 3) // 2
             a = tape[k + 4] + own
             b = tape[k + 5] + own
@@ -101,7 +102,7 @@ def _riders(tape, s):
     for _ in range(tape[tape[H_RIDERS]]):
         count = tape[at + 6]
         for p in range(count + 1):
-            for axis in range(3):
+            for axis in range(axes(s)):
                 entry = tape[k + 1 + 3 * p + axis]
                 if entry >= 0:
                     value = one if p == 0 else load(s, tape[at + 9] + p - 1)

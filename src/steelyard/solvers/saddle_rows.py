@@ -11,7 +11,8 @@ from ..constraints.links import link_half_square, link_rate
 from ..constraints.riders import DECK, HEAD, rider_offset, rider_slip
 from ..kernel import inner
 from ..math.lanes import absolute, fma, load, select, splat, store
-from ..math.vectors import dot, load_vector
+from ..math.pointers import axes
+from ..math.vectors import dot, load_coordinates
 from ..model.tape import (
     H_IMPULSE,
     H_LINKS,
@@ -55,7 +56,7 @@ def pull(tape, s, work):
         multiplier = load(s, tape[link + 12])
         d = tape[link + 13]
         size = zero
-        for axis in range(3):
+        for axis in range(axes(s)):
             part = multiplier * load(s, d + axis)
             size = size + absolute(part)
             store(s, fa + axis, load(s, fa + axis) - part)
@@ -67,7 +68,7 @@ def pull(tape, s, work):
     at = tape[H_RIDERS] + 1
     for _ in range(tape[tape[H_RIDERS]]):
         count = tape[at + 6]
-        for axis in range(3):
+        for axis in range(axes(s)):
             force = load(s, tape[at + 3] + axis)
             for k in range(count + 1):
                 f = tape[at + 2] if k == 0 else tape[at + HEAD + DECK * (k - 1) + 2]
@@ -99,7 +100,7 @@ def keep_multipliers(tape, s):
         off = off | over
     at = tape[H_RIDERS] + 1
     for _ in range(tape[tape[H_RIDERS]]):
-        for axis in range(3):
+        for axis in range(axes(s)):
             off = off | (absolute(rider_offset(s, tape, at, axis)) > splat(_NEAR))
         at += HEAD + DECK * tape[at + 6]
     return off
@@ -145,7 +146,7 @@ def position_rows(tape, s, active, single):
     at = tape[H_RIDERS] + 1
     k = tape[H_SADDLE_RIDERS] + 1
     for _ in range(tape[tape[H_RIDERS]]):
-        for axis in range(3):
+        for axis in range(axes(s)):
             error = rider_offset(s, tape, at, axis)
             store(s, tape[k] + axis, zero - error)
             bad = bad | (absolute(error) > tolerance)
@@ -168,7 +169,7 @@ def add_position_multipliers(tape, s, scale, active):
     at = tape[H_RIDERS] + 1
     k = tape[H_SADDLE_RIDERS] + 1
     for _ in range(tape[tape[H_RIDERS]]):
-        for axis in range(3):
+        for axis in range(axes(s)):
             row = tape[at + 3] + axis
             change = select(active, load(s, tape[k] + axis) * scale, zero)
             store(s, row, load(s, row) - change)
@@ -220,7 +221,7 @@ def leaving(tape, s, dt):
         found = found | (leaves > _near(tape, s, length))
     at = tape[H_RIDERS] + 1
     for _ in range(tape[tape[H_RIDERS]]):
-        for axis in range(3):
+        for axis in range(axes(s)):
             found = found | (absolute(dt * rider_slip(s, tape, at, axis)) > splat(_NEAR))
         at += HEAD + DECK * tape[at + 6]
     return found
@@ -232,9 +233,12 @@ def acceleration_rows(tape, s):
     at = tape[H_LINKS]
     for index in range(tape[at]):
         link = at + 1 + LINK * index
-        ax, ay, az = load_vector(s, tape[link + 2])
-        bx, by, bz = load_vector(s, tape[link + 3])
-        square = dot(ax - bx, ay - by, az - bz, ax - bx, ay - by, az - bz)
+        ax, ay, az = load_coordinates(s, tape[link + 2])
+        bx, by, bz = load_coordinates(s, tape[link + 3])
+        x = ax - bx
+        y = ay - by
+        z = az - bz
+        square = dot(x, y, z, x, y, z)
         rate = load(s, tape[link + 9])
         wanted = fma(load(s, tape[link + 8]), load(s, tape[link + 16]), rate * rate) - square
         row = tape[tape[H_SADDLE_LINKS] + 1 + SADDLE_LINK * index]
@@ -243,7 +247,7 @@ def acceleration_rows(tape, s):
     k = tape[H_SADDLE_RIDERS] + 1
     mover = tape[H_MOVERS] + 1
     for _ in range(tape[tape[H_RIDERS]]):
-        for axis in range(3):
+        for axis in range(axes(s)):
             wanted = splat(0.0)
             for p in range(tape[at + 6]):
                 deck = at + HEAD + DECK * p
@@ -282,7 +286,7 @@ def take_multipliers(tape, s, worlds):
     at = tape[H_RIDERS] + 1
     k = tape[H_SADDLE_RIDERS] + 1
     for _ in range(tape[tape[H_RIDERS]]):
-        for axis in range(3):
+        for axis in range(axes(s)):
             row = tape[at + 3] + axis
             value = zero - load(s, tape[k] + axis)
             store(s, row, select(worlds, value, load(s, row)))
@@ -317,7 +321,7 @@ def velocity_rows(tape, s):
     at = tape[H_RIDERS] + 1
     k = tape[H_SADDLE_RIDERS] + 1
     for _ in range(tape[tape[H_RIDERS]]):
-        for axis in range(3):
+        for axis in range(axes(s)):
             store(s, tape[k] + axis, splat(0.0) - rider_slip(s, tape, at, axis))
         k += 4 + 3 * tape[at + 6]
         at += HEAD + DECK * tape[at + 6]

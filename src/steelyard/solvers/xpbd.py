@@ -30,6 +30,8 @@ from ..constraints.links import link_multiplier, link_rate
 from ..constraints.riders import DECK, HEAD, rider_impulses, rider_multiplier
 from ..kernel import inner
 from ..math.lanes import fma, load, select, splat, sqrt, store
+from ..math.pointers import axes
+from ..math.vectors import add_scaled, dot, load_coordinates, store_coordinates
 from ..model.tape import (
     COMPLIANCE,
     CONTACT,
@@ -84,7 +86,7 @@ def _clear(tape, s):
         store(s, link_multiplier(tape, at + 1 + LINK * index, False), zero)
     at = tape[H_RIDERS] + 1
     for _ in range(tape[tape[H_RIDERS]]):
-        for axis in range(3):
+        for axis in range(axes(s)):
             store(s, rider_multiplier(tape, at, False) + axis, zero)
         at += HEAD + DECK * tape[at + 6]
     at = tape[H_CONTACTS]
@@ -98,10 +100,12 @@ def _direction(s, a, b):
     """Unit vector from b to a, 0 where they coincide, and their distance."""
     zero = splat(0.0)
     one = splat(1.0)
-    x = load(s, a) - load(s, b)
-    y = load(s, a + 1) - load(s, b + 1)
-    z = load(s, a + 2) - load(s, b + 2)
-    distance = sqrt(fma(z, z, fma(y, y, x * x)))
+    ax, ay, az = load_coordinates(s, a)
+    bx, by, bz = load_coordinates(s, b)
+    x = ax - bx
+    y = ay - by
+    z = az - bz
+    distance = sqrt(dot(x, y, z, x, y, z))
     some = distance > zero
     inverse = select(some, one / select(some, distance, one), zero)
     return x * inverse, y * inverse, z * inverse, distance
@@ -110,10 +114,12 @@ def _direction(s, a, b):
 @inner
 def _pull(s, x, impulse, weight, nx, ny, nz, change):
     """Add ``change`` times n to an impulse, and what it does to the place."""
-    for component, part in enumerate((nx, ny, nz)):
-        push = change * part
-        store(s, impulse + component, load(s, impulse + component) + push)
-        store(s, x + component, fma(weight, push, load(s, x + component)))
+    px = change * nx
+    py = change * ny
+    pz = change * nz
+    ix, iy, iz = load_coordinates(s, impulse)
+    store_coordinates(s, impulse, ix + px, iy + py, iz + pz)
+    add_scaled(s, x, weight, px, py, pz)
 
 
 @inner
@@ -193,9 +199,8 @@ def _rebound_cables(tape, s):
         link = at + 1 + LINK * index
         if tape[link + 10] != 0:
             d = tape[link + 13]
-            square = load(s, d) * load(s, d)
-            square = fma(load(s, d + 1), load(s, d + 1), square)
-            square = fma(load(s, d + 2), load(s, d + 2), square)
+            dx, dy, dz = load_coordinates(s, d)
+            square = dot(dx, dy, dz, dx, dy, dz)
             wa, wb = load(s, tape[link + 6]), load(s, tape[link + 7])
             slope = square * (wa + wb)
             target = load(s, tape[link + 14])
@@ -206,7 +211,7 @@ def _rebound_cables(tape, s):
             met = met & (error > zero) & (slope > zero)
             change = select(met, error / select(slope > zero, slope, one), zero)
             two = tape[link + 5] < tape[H_IMPULSE] + 3 * tape[H_PARTICLES]
-            for component in range(3):
+            for component in range(axes(s)):
                 push = change * load(s, d + component)
                 v = tape[link + 2] + component
                 store(s, v, load(s, v) - wa * push)
