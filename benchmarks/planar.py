@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -46,7 +47,7 @@ def chain(planar: bool) -> sy.Scene:
     scene = sy.Scene(planar=planar)
     row = [scene.add(sy.Particle(position=(0.1 * (k + 1), 0.0, 0.0))) for k in range(20)]
     scene.add(sy.RodConstraint(row[0], (0.0, 0.0, 0.0)))
-    for a, b in zip(row, row[1:], strict=False):
+    for a, b in pairwise(row):
         scene.add(sy.Rod(a, b))
     return scene
 

@@ -8,6 +8,7 @@ from .integrators.composed_rattle import ComposedRattle
 from .integrators.explicit_euler import ExplicitEuler
 from .integrators.exponential import ExponentialRungeKutta
 from .integrators.generalised_alpha import GeneralisedAlpha
+from .integrators.impact_rattle import ImpactRattle
 from .integrators.implicit_midpoint import ImplicitMidpoint
 from .integrators.linearly_implicit import LinearlyImplicit
 from .integrators.rattle import Rattle
@@ -63,6 +64,7 @@ __all__ = [
     "GeneralisedAlpha",
     "Gravity",
     "Ground",
+    "ImpactRattle",
     "ImplicitMidpoint",
     "LinePlatform",
     "LinearlyImplicit",

@@ -11,6 +11,7 @@ from .integrators.rattle import Rattle
 from .integrators.rk4 import RungeKutta4
 from .integrators.symplectic_euler import SymplecticEuler
 from .scene import checks
+from .scene.contacts import ContactGenerator
 from .scene.forces import Drag, StiffSpring, UserForce
 from .scene.links import Cable, CableConstraint
 from .scene.rider import Rider
@@ -119,6 +120,8 @@ class Method:
                 "WorstFirst cannot hold a Rider: it has no impulse for it. Use Direct(), or spread "
                 "the load's mass over the deck (steelyard.scenes.lumped_masses)."
             )
+        if self.integrator.splits:
+            self._refuse_divided(name, scene)
         if self.integrator.reverses:
             self._refuse_backwards(name, scene)
         sprung = {id(spring.particle) for spring in scene.of(StiffSpring)}
@@ -152,6 +155,19 @@ class Method:
             raise ValueError(
                 f"{name} cannot take a UserForce: it needs the force at states that only its own iteration "
                 "knows. Use Rattle() with Direct(), or LinearlyImplicit() where nothing is linked."
+            )
+
+    def _refuse_divided(self, name: str, scene: Scene) -> None:
+        """Raise if a step cannot be divided at impacts."""
+        if self.solver is not None and not self.solver.sparse:
+            raise ValueError(
+                f"{name} does not work with {type(self.solver).__name__}, whose errors are larger than those of "
+                "an impact's time. Use Direct() with it."
+            )
+        for thing in scene.of(Drag, StiffSpring, ContactGenerator):
+            raise ValueError(
+                f"{name} cannot step a {type(thing).__name__}: it is known for whole steps alone, which impacts "
+                "divide. Use Rattle()."
             )
 
     @staticmethod

@@ -39,8 +39,8 @@ class Stage:
     def address(self, *, planar: bool) -> int:
         """Where its machine code lies; compiled, or loaded from the cache, at first."""
         if planar not in self._compiled:
-            swap = {Doubles: PlanarDoubles} if planar else {}
-            arguments = tuple(swap.get(argument, argument) for argument in self._arguments)
+            scratch = PlanarDoubles if planar else Doubles
+            arguments = tuple(scratch if a == Doubles else a for a in self._arguments)
             compiled: Any = CFunc(self._function, (arguments, types.void), {}, OPTIONS)
             compiled.enable_caching()
             stamp(compiled._cache, self._function)

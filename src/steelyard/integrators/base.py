@@ -54,6 +54,8 @@ class Integrator:
 
     #: Whether part of its step runs backwards in time.
     reverses: ClassVar[bool] = False
+    #: Whether its step is divided where impacts are.
+    splits: ClassVar[bool] = False
 
     @property
     def fractions(self) -> tuple[float, ...]:
@@ -75,6 +77,10 @@ class Integrator:
             acting: what forces there are.
         """
         raise NotImplementedError
+
+    def parts(self, solver: Solver | None, acting: Acting) -> Recipe:
+        """Stages of one of the parts into which impacts divide a step; none where they do not."""
+        return ()
 
     def order(self) -> int:
         """Order of convergence on smooth motion."""

@@ -30,7 +30,7 @@ from .parameters import PARTICLES, Key, Parameters, Slot
 from .propagators import add_propagators
 from .saddle import Saddle
 from .stiffness import Stiffness
-from .tape import COMPLIANCE, CONTACT, HEADER, LINK
+from .tape import COMPLIANCE, CONTACT, EVENT, HEADER, LINK
 
 #: Header fields that are -1, not an empty section, where a scene has no such rows.
 _ABSENT = ("user_forces", "force", "start", "free", "impulse", "dense")
@@ -97,7 +97,7 @@ class Compiler:
             "springs": 7, "gravities": 3, "buoyancies": 5, "drags": 7, "stiff_springs": 8, "drift": 1,
             "winches": 3, "movers": 5, "links": LINK, "contacts": CONTACT, "generators": 2,
             "recipe": 2, "unknowns": 4, "spring_blocks": 4, "drag_blocks": 1, "float_blocks": 1,
-            "propagators": 2, "compliances": COMPLIANCE,
+            "propagators": 2, "parts": 2, "compliances": COMPLIANCE,
         }  # fmt: skip
         self.next_row = 0
         self.start: list[float] = []
@@ -291,7 +291,7 @@ class Compiler:
             self.header["damping"] = self.slot(3 * count, (damping_key,), phis)
         elif method.integrator.smooth:
             self.header["damping"] = self.slot(count, (damping_key,), derived.rate)
-        elif len(method.integrator.fractions) > 1:
+        elif len(method.integrator.fractions) > 1 or method.integrator.splits:
             self.header["damping"] = self.take(count)
         else:
             self.header["damping"] = self.slot(
@@ -304,6 +304,21 @@ class Compiler:
         self.header["dt"] = self.constant(method.substep)
         self.header["divisions"] = method.substeps
         self._substeps()
+        self._events()
+
+    def _events(self) -> None:
+        """Where impacts divide the step: copies of the state and notes of what may close."""
+        header = self.header
+        header["trial"] = self.zero
+        header["impacts"] = getattr(self.method.integrator, "impacts", 0)
+        header["events"] = header["kept"] = header["damping_rates"] = -1
+        if self.method.integrator.splits:
+            closing = len(self.contacts) + sum(map(self.is_cable, self.links))
+            header["events"] = self.take(EVENT * closing)
+            header["kept"] = self.take(self.model.state_rows)
+            header["trial"] = self.take(1)
+            rates = ((PARTICLES, "damping"),)
+            header["damping_rates"] = self.slot(len(self.particles), rates, derived.rate)
 
     def _substeps(self) -> None:
         """Lengths, what damping keeps and how impulses grow, of each part of a step that is made of several."""
@@ -350,17 +365,22 @@ class Compiler:
         """The chosen particles, or all."""
         return self.particles if chosen is None else list(chosen)
 
+    def _words(self, recipe: Recipe) -> list[int]:
+        """Stages as they stand on the tape."""
+        planar = self.scene.planar
+        return [word for stage, part in recipe for word in (stage.address(planar=planar), part)]
+
     def _method(self) -> None:
         """Codes and settings of the method, and the generators in the order they were added."""
         solver = self.method.solver
         held = solver if self.header["constrained"] else None
         recipe = self.method.integrator.recipe(held, self._acting())
-        planar = self.scene.planar
-        self.sections["recipe"] = [
-            word for stage, part in recipe for word in (stage.address(planar=planar), part)
-        ]
+        self.sections["recipe"] = self._words(recipe)
         self.model.recipe = recipe
-        self.header["hasty"] = int(bool(held and held.sparse and self.contacts))
+        splits = self.method.integrator.splits
+        if splits:
+            self.sections["parts"] = self._words(self.method.integrator.parts(held, self._acting()))
+        self.header["hasty"] = int(bool(held and held.sparse and self.contacts and not splits))
         self.header["contacts_most"] = most = len(self.links) + len(self.contacts)
         self.header["values"] = -1
         if held is not None and not held.staged:

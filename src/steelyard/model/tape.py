@@ -99,14 +99,22 @@ from __future__ import annotations
     H_SADDLE_RIDERS,
     H_DIVISIONS,
     H_COMPLIANCES,
-) = range(90)
-HEADER = 90
+    H_IMPACTS,
+    H_EVENTS,
+    H_PARTS,
+    H_KEPT,
+    H_TRIAL,
+    H_DAMPING_RATES,
+) = range(96)
+HEADER = 96
 
 # Width of the records of links, contacts and springs that a solver holds; written field by field.
 LINK = 17
 CONTACT = 24
 SADDLE_LINK = 10
 COMPLIANCE = 10
+# Work rows of a contact or cable whose impact is resolved inside the step.
+EVENT = 5
 
 # Records of clusters and of loads on them: what comes before their lists, and an entry of a cluster's. Work rows of a
 # cluster: inertia, inverse of that with loads, quaternion (angular velocity in the velocity stage), shift of the centre

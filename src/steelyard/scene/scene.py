@@ -109,9 +109,9 @@ class Scene:
             )
         if self.planar:
             for vector in checks.VECTORS:
-                value = getattr(thing, vector, None)
-                if np.ndim(value) == 1:  # a float's gravity is a number
-                    checks.in_plane(name, vector, np.array(value))
+                value = np.array(getattr(thing, vector, None), dtype=np.float64)
+                if value.ndim == 1:  # a float's gravity is a number
+                    checks.in_plane(name, vector, value)
         self.things.append(thing)
         return thing
 

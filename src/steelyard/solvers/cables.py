@@ -16,6 +16,7 @@ from ..model.tape import (
     H_MASK,
     H_RIDERS,
     H_TOLERANCE,
+    H_TRIAL,
     H_USED_MASK,
     LINK,
 )
@@ -108,11 +109,12 @@ def withdraw(tape, s, skip, velocity, worlds, single):
 
 @inner
 def tighten(tape, s, velocity, dt, worlds, single):
-    """Take up slack cables that overstretch, all or the lowest only. Worlds that changed."""
+    """Take up slack cables that overstretch, all or the lowest only; none on trial. Worlds that changed."""
     zero = splat(0.0)
     one = splat(1.0)
     half = splat(0.5)
     changed = zero > zero
+    worlds = worlds & (load(s, tape[H_TRIAL]) < half)
     at = tape[H_LINKS]
     for index in range(tape[at]):
         link = at + 1 + LINK * index

@@ -11,6 +11,7 @@ from __future__ import annotations
 from ..constraints.contacts import contact_multiplier
 from ..kernel import inner
 from ..math.lanes import absolute, any_lane, fma, load, select, splat, sqrt, store
+from ..math.pointers import spatial
 from ..model.tape import (
     CONTACT,
     H_CONTACT_BACKWARD,
@@ -52,7 +53,7 @@ def factorise_contacts(tape, s, skip, softness):
         if tape[k + 4] >= 0:
             value = fma(load(s, tape[k + 4]), splat(1.0 + softness) - taken, value)
         store(s, tape[k], value)
-    block_ldl.factor(tape, tape[H_CONTACT_FACTOR], s, skip)
+    block_ldl.factor(tape, tape[H_CONTACT_FACTOR], spatial(s), skip)
 
 
 @inner
@@ -92,8 +93,8 @@ def _stick(tape, s, skip, first):
                 store(s, guess + slot + 1, b * load(s, mask + 1))
                 store(s, guess + slot + 2, c * load(s, mask + 2))
             k += 5 + 4 * tape[k + 4]
-        block_ldl.forward(tape, tape[H_CONTACT_FORWARD], s, skip)
-        block_ldl.backward(tape, tape[H_CONTACT_BACKWARD], s, skip)
+        block_ldl.forward(tape, tape[H_CONTACT_FORWARD], spatial(s), skip)
+        block_ldl.backward(tape, tape[H_CONTACT_BACKWARD], spatial(s), skip)
         for index in range(tape[at]):
             slot = tape[at + 1 + CONTACT * index + 19]
             for row in range(slot, slot + 3):

@@ -1,0 +1,357 @@
+"""RATTLE with the times of impacts resolved inside the step.
+
+A step is first tried without the contacts and cables that carry nothing. Where a gap closes in it, or a slack cable
+reaches its end, the cubic through both ends of the step (``step_impact``) tells when; two trials that end there mend
+the time by Newton's method. The step is then taken up to the impact, which is one of ``Rattle`` that begins and ends
+without touching: velocities rebound by the speed found there, and what is left of the step follows in the same way, up
+to ``impacts`` times. What is left after those is taken as ``Rattle`` takes it; so balls come to rest.
+
+Order 2 with impacts too, where ``Rattle`` has order 1 in their time; a ball on level ground is exact. Energy is kept by
+restitution 1 across impacts to the error of their speed. Contacts and cables that carry load, and those that start in
+penetration, are held as by ``Rattle``. A step without an impact costs one of ``Rattle``, one with an impact four.
+
+Works with Direct alone, since sweeps leave errors larger than those of the time. Refuses what is tabulated for one
+length of the step or known only between steps: drag, stiff springs, user-written forces and contacts.
+
+Source: Hairer, Norsett & Wanner, *Solving Ordinary Differential Equations I*, II.6 (dense output and events).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+from ..collision.geometry import contact_geometry
+from ..constraints.contacts import contact_speed
+from ..constraints.controls import move_controls
+from ..constraints.links import link_half_square, link_rate
+from ..kernel import inner
+from ..math.lanes import absolute, any_lane, fma, load, select, splat, store
+from ..math.pointers import LANES
+from ..model.tape import (
+    CONTACT,
+    EVENT,
+    FRESH,
+    H_BLOCKS,
+    H_CONTACTS,
+    H_DAMPED,
+    H_DAMPING,
+    H_DAMPING_RATES,
+    H_DT,
+    H_EVENTS,
+    H_IMPACTS,
+    H_KEPT,
+    H_LINKS,
+    H_PARTICLES,
+    H_PARTS,
+    H_STATE_ROWS,
+    H_TRIAL,
+    LINK,
+)
+from ..scene import checks
+from ..solvers.base import Solver
+from ..solvers.stages import begin_step
+from ..stage import call_stage, stage
+from .base import Acting, Integrator, Recipe
+from .rattle import rattle_halves
+
+# Rows of an event: gap [m] or slack (L^2 - d^2)/2, and its rate, where the part of the step begins; whether it may close,
+# closes in this part, and at which rate it leaves.
+_GAP, _RATE, _FREE, _CLOSES, _LEAVES = range(5)
+_TRIALS = 3
+_BISECTIONS = 50
+# Shortest part of a step, and how far past the impact it goes, so that the contact is felt, over the step.
+_SHORTEST, _PAST = 1e-6, 1e-10
+# Impacts so close in time, over the step, are one.
+_TOGETHER = 1e-8
+
+
+@dataclass(frozen=True)
+class ImpactRattle(Integrator):
+    """RATTLE with resolved times of impacts (see the module).
+
+    Args:
+        impacts: most impacts of a step whose times are resolved, at least 1.
+    """
+
+    impacts: int = 4
+
+    damping_share: ClassVar[float] = 0.5
+    evaluations: ClassVar[tuple[float | None, ...]] = ()
+    solver_stages: ClassVar[tuple[bool, ...]] = (True,)
+    splits: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        checks.whole("ImpactRattle", "impacts", self.impacts, least=1, remedy="Use 4.")
+
+    def recipe(self, solver: Solver | None, acting: Acting) -> Recipe:
+        """One stage that runs those of ``parts``."""
+        return ((impact_rattle_step, 0),)
+
+    def parts(self, solver: Solver | None, acting: Acting) -> Recipe:
+        """RATTLE, with notes of what may close."""
+        first, second = rattle_halves(acting)
+        if solver is None:
+            return ((first, 0), (second, 1))
+        return (
+            (begin_step, 0), (note_gaps, 0), (move_controls, 0), (first, 0), (solver.stage, 0), (second, 1),
+            (solver.stage, 1),
+        )  # fmt: skip
+
+    def order(self) -> int:
+        """Second order."""
+        return 2
+
+    def stable_limit(self) -> float:
+        """Stable while dt times angular frequency is below 2."""
+        return 2.0
+
+
+@inner
+def _slack(tape, s, link):
+    """How short a cable is of its end, as (L^2 - d^2)/2, and its rate."""
+    length = load(s, tape[link + 8])
+    rate = length * load(s, tape[link + 9]) - link_rate(s, link, tape)
+    return -link_half_square(s, link, tape, length), rate
+
+
+@stage
+def note_gaps(tape, s, skip, part):
+    """At the start of a part of the step: gaps and what may close; leave out what is on trial, set how it rebounds."""
+    zero = splat(0.0)
+    one = splat(1.0)
+    half = splat(0.5)
+    trial = load(s, tape[H_TRIAL]) > half
+    event = tape[H_EVENTS]
+    at = tape[H_CONTACTS]
+    for index in range(tape[at]):
+        contact = at + 1 + CONTACT * index
+        decided = tape[contact + 18]
+        free = (load(s, tape[contact + 15]) <= zero) & (load(s, decided + 3) < half)
+        store(s, event + _GAP, load(s, tape[contact + 17]))
+        store(s, event + _RATE, contact_speed(s, tape, contact, 0))
+        store(s, event + _FREE, select(free, one, zero))
+        near = load(s, decided)
+        store(s, decided, select(trial & free, zero, near))
+        closes = load(s, event + _CLOSES) > half
+        store(s, decided, select(closes, one, load(s, decided)))
+        bounce = select(closes, load(s, event + _LEAVES), load(s, decided + 2))
+        store(s, decided + 2, bounce)
+        if any_lane(closes):
+            skip[tape[contact + 20]] = 0
+        event += EVENT
+    at = tape[H_LINKS]
+    for index in range(tape[at]):
+        link = at + 1 + LINK * index
+        if tape[link + 10] != 0:
+            gap, rate = _slack(tape, s, link)
+            free = (load(s, tape[link + 12]) <= zero) & (load(s, tape[link + 14] + 1) < half)
+            store(s, event + _GAP, gap)
+            store(s, event + _RATE, rate)
+            store(s, event + _FREE, select(free, one, zero))
+            closes = load(s, event + _CLOSES) > half
+            target = load(s, tape[link + 14])
+            follow = load(s, tape[link + 8]) * load(s, tape[link + 9])
+            leaves = follow - load(s, event + _LEAVES)
+            store(s, tape[link + 14], select(closes, leaves, target))
+            event += EVENT
+
+
+@inner
+def _fall_time(gap, rate, later, later_rate, length):
+    """When the cubic through both ends falls through 0, by bisection: it is above at first and below at last."""
+    half = splat(0.5)
+    one = splat(1.0)
+    inverse = one / length
+    change = (later - gap) * inverse
+    bend = splat(3.0) * change - splat(2.0) * rate - later_rate
+    twist = rate + later_rate - splat(2.0) * change
+    low = splat(0.0)
+    high = length
+    for _ in range(_BISECTIONS):
+        time = half * (low + high)
+        share = time * inverse
+        value = fma(time, fma(share, fma(share, twist, bend), rate), gap)
+        above = value > splat(0.0)
+        low = select(above, time, low)
+        high = select(above, high, time)
+    return half * (low + high)
+
+
+@inner
+def _earliest(s, event, gap, rate, first, length, active, time):
+    """The earlier of ``time`` and when this one closes; on later trials by Newton's method from the present end."""
+    zero = splat(0.0)
+    half = splat(0.5)
+    free = active & (load(s, event + _FREE) > half)
+    if first:
+        start = load(s, event + _GAP)
+        start_rate = load(s, event + _RATE)
+        closes = free & (gap < zero) & ((start > zero) | (start_rate > zero))
+        touches = free & (gap < zero) & (start <= zero) & (start_rate <= zero)
+        found = _fall_time(start, start_rate, gap, rate, length)
+        found = select(closes, found, select(touches, zero, time))
+    else:
+        closing = free & (rate < zero)
+        found = length + gap / select(closing, zero - rate, splat(1.0))
+        found = select(closing, found, time)
+    return select(found < time, found, time)
+
+
+@inner
+def _when(tape, s, first, length, left, active):
+    """When in this part of the step the first impact happens; ``left`` where none does."""
+    time = left
+    event = tape[H_EVENTS]
+    at = tape[H_CONTACTS]
+    for index in range(tape[at]):
+        contact = at + 1 + CONTACT * index
+        rate = contact_speed(s, tape, contact, 0)
+        gap = load(s, tape[contact + 17])
+        time = _earliest(s, event, gap, rate, first, length, active, time)
+        event += EVENT
+    at = tape[H_LINKS]
+    for index in range(tape[at]):
+        link = at + 1 + LINK * index
+        if tape[link + 10] != 0:
+            gap, rate = _slack(tape, s, link)
+            time = _earliest(s, event, gap, rate, first, length, active, time)
+            event += EVENT
+    return time
+
+
+@inner
+def _note(s, event, gap, rate, restitution, meets, near):
+    """What closes at the end of this part, and how it rebounds."""
+    zero = splat(0.0)
+    closing = meets & (load(s, event + _FREE) > splat(0.5)) & (rate < zero)
+    closes = closing & (gap < (zero - rate) * near)
+    store(s, event + _CLOSES, select(closes, splat(1.0), zero))
+    store(s, event + _LEAVES, select(closes, zero - restitution * rate, zero))
+
+
+@inner
+def _note_impacts(tape, s, meets, near):
+    """Note what closes within ``near`` [s] of the end of the last trial."""
+    event = tape[H_EVENTS]
+    at = tape[H_CONTACTS]
+    for index in range(tape[at]):
+        contact = at + 1 + CONTACT * index
+        rate = contact_speed(s, tape, contact, 0)
+        gap = load(s, tape[contact + 17])
+        _note(s, event, gap, rate, load(s, tape[contact + 13]), meets, near)
+        event += EVENT
+    at = tape[H_LINKS]
+    for index in range(tape[at]):
+        link = at + 1 + LINK * index
+        if tape[link + 10] != 0:
+            gap, rate = _slack(tape, s, link)
+            _note(s, event, gap, rate, load(s, tape[link + 11]), meets, near)
+            event += EVENT
+
+
+@inner
+def _forget_impacts(tape, s):
+    """What has rebounded carries nothing; notes are cleared."""
+    zero = splat(0.0)
+    event = tape[H_EVENTS]
+    at = tape[H_CONTACTS]
+    for index in range(tape[at]):
+        contact = at + 1 + CONTACT * index
+        leaves = load(s, event + _LEAVES) > zero
+        for axis in range(3):
+            row = tape[contact + 15] + axis
+            store(s, row, select(leaves, zero, load(s, row)))
+        store(s, event + _CLOSES, zero)
+        store(s, event + _LEAVES, zero)
+        event += EVENT
+    at = tape[H_LINKS]
+    for index in range(tape[at]):
+        link = at + 1 + LINK * index
+        if tape[link + 10] != 0:
+            row = tape[link + 12]
+            leaves = load(s, event + _LEAVES) > zero
+            store(s, row, select(leaves, zero, load(s, row)))
+            store(s, event + _CLOSES, zero)
+            store(s, event + _LEAVES, zero)
+            event += EVENT
+
+
+@inner
+def _set_length(tape, s, length):
+    """Length of the part that follows, and what damping keeps over half of it."""
+    store(s, tape[H_DT], length)
+    if tape[H_DAMPED] != 0:
+        for p in range(tape[H_PARTICLES]):
+            for k in range(LANES):
+                time = 0.5 * s[tape[H_DT], k]
+                s[tape[H_DAMPING] + p, k] = math.exp(-s[tape[H_DAMPING_RATES] + p, k] * time)
+
+
+@inner
+def _run(tape, s, skip, length):
+    """One step of RATTLE over ``length``; contact gaps at its end."""
+    _set_length(tape, s, length)
+    skip[tape[H_BLOCKS] + FRESH] = 1
+    at = tape[H_PARTS]
+    for index in range(tape[at]):
+        call_stage(tape[at + 1 + 2 * index], tape, s, skip, tape[at + 2 + 2 * index])
+    contact_geometry(tape, s)
+
+
+@inner
+def _put_back(tape, s, worlds):
+    """State of some worlds as it was kept."""
+    for row in range(tape[H_STATE_ROWS]):
+        store(s, row, select(worlds, load(s, tape[H_KEPT] + row), load(s, row)))
+
+
+@stage
+def impact_rattle_step(tape, s, skip, part):
+    """Parts of the step, each up to the next impact."""
+    zero = splat(0.0)
+    one = splat(1.0)
+    half = splat(0.5)
+    dt = load(s, tape[H_DT])
+    left = dt
+    active = dt > zero
+    shortest = splat(_SHORTEST) * dt
+    _forget_impacts(tape, s)
+    for turn in range(tape[H_IMPACTS] + 1):
+        for row in range(tape[H_STATE_ROWS]):
+            store(s, tape[H_KEPT] + row, load(s, row))
+        trial = one if turn < tape[H_IMPACTS] else zero
+        store(s, tape[H_TRIAL], trial)
+        length = left
+        _run(tape, s, skip, length)
+        if turn < tape[H_IMPACTS]:
+            time = _when(tape, s, True, length, left, active)
+            meets = active & (time < left)
+            if any_lane(meets):
+                length = select(time > shortest, time, shortest)
+                for _ in range(1, _TRIALS):
+                    _put_back(tape, s, zero <= zero)
+                    _run(tape, s, skip, length)
+                    time = _when(tape, s, False, length, left, active)
+                    # A part that is as short as may be stays so.
+                    change = select(meets, time - length, zero)
+                    most = splat(0.1) * length
+                    change = select(absolute(change) < most, change, zero)
+                    length = length + change
+                    length = select(length > shortest, length, shortest)
+                _note_impacts(tape, s, meets, splat(_TOGETHER) * dt + shortest)
+                length = select(meets, length + splat(_PAST) * dt, length)
+                store(s, tape[H_TRIAL], select(meets, zero, one))
+                _put_back(tape, s, zero <= zero)
+                _run(tape, s, skip, length)
+                _forget_impacts(tape, s)
+        done = select(active, zero, one) > half
+        _put_back(tape, s, done)
+        left = select(active, left - length, dt)
+        active = active & (left > shortest)
+        left = select(active, left, dt)
+        if not any_lane(active):
+            break
+    store(s, tape[H_TRIAL], zero)
+    _set_length(tape, s, dt)
