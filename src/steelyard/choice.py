@@ -24,6 +24,7 @@ from .integrators.composed_rattle import ComposedRattle
 from .integrators.explicit_euler import ExplicitEuler
 from .integrators.exponential import ExponentialRungeKutta
 from .integrators.generalised_alpha import GeneralisedAlpha
+from .integrators.impact_rattle import ImpactRattle
 from .integrators.implicit_midpoint import ImplicitMidpoint
 from .integrators.linearly_implicit import LinearlyImplicit
 from .integrators.rattle import Rattle
@@ -78,6 +79,7 @@ CANDIDATES = (
     Candidate("velocity Verlet, order 4", ComposedRattle()),
     Candidate("velocity Verlet, order 6", ComposedRattle(substeps=9)),
     Candidate("RATTLE, direct", Rattle(), Direct()),
+    Candidate("RATTLE, impacts inside, direct", ImpactRattle(), Direct()),
     Candidate("RATTLE of order 4, direct", ComposedRattle(), Direct()),
     Candidate("RATTLE of order 6, direct", ComposedRattle(substeps=9), Direct()),
     Candidate("generalised-alpha", GeneralisedAlpha()),
@@ -247,7 +249,8 @@ class _Runs:
 
 
 def candidates(scene: Scene) -> Iterator[Candidate]:
-    """The candidates that can step a scene; with a solver only where one is needed."""
+    """The candidates that can step a scene; with a solver, or with resolved impacts, only where there may be any."""
+    impacts = bool(scene.of(Cable, CableConstraint, Ground, LinePlatform))
     held = bool(
         scene.of(
             Rod,
@@ -262,7 +265,7 @@ def candidates(scene: Scene) -> Iterator[Candidate]:
     )
     for candidate in CANDIDATES:
         holds = candidate.solver is not None or candidate.integrator.holds_links
-        if held == holds:
+        if held == holds and (impacts or not candidate.integrator.splits):
             try:
                 candidate.at(1.0).refuse(scene)
             except ValueError:

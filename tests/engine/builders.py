@@ -18,6 +18,7 @@ Array = npt.NDArray[np.float64]
 STAGED = {
     "Rattle-Direct": (sy.Rattle(), sy.Direct()),
     "Rattle-GaussSeidel": (sy.Rattle(), sy.GaussSeidel(passes=60)),
+    "ImpactRattle-Direct": (sy.ImpactRattle(), sy.Direct()),
     "SymplecticEuler-Direct": (sy.SymplecticEuler(), sy.Direct()),
     "SymplecticEuler-GaussSeidel": (sy.SymplecticEuler(), sy.GaussSeidel(passes=60)),
 }
@@ -29,6 +30,8 @@ RESOLVED = {
 # Velocities from positions, in substeps.
 SMALL_STEPS = {"SymplecticEuler-Xpbd": (sy.SymplecticEuler(), sy.Xpbd(substeps=10))}
 METHODS = STAGED | RESOLVED | SMALL_STEPS
+# Those that take each step as one, and so contacts that are known between steps.
+STEPWISE = {name: parts for name, parts in METHODS.items() if not parts[0].splits}
 # What cannot hold cables and contacts.
 COMPOSED = {
     "ComposedRattle-Direct": (sy.ComposedRattle(), sy.Direct()),

@@ -56,8 +56,8 @@ from ..stage import call_stage, stage
 from .base import Acting, Integrator, Recipe
 from .rattle import rattle_halves
 
-# Rows of an event: gap [m] or slack (L^2 - d^2)/2, and its rate, where the part of the step begins; whether it may close,
-# closes in this part, and at which rate it leaves.
+# Rows of an event: gap [m] or slack (L^2 - d^2)/2, and its rate, where the part of the step begins; whether it may
+# close, closes in this part, and at which rate it leaves.
 _GAP, _RATE, _FREE, _CLOSES, _LEAVES = range(5)
 _TRIALS = 3
 _BISECTIONS = 50
@@ -65,6 +65,8 @@ _BISECTIONS = 50
 _SHORTEST, _PAST = 1e-6, 1e-10
 # Impacts so close in time, over the step, are one.
 _TOGETHER = 1e-8
+# What is no farther off, and comes no nearer within the step [m; of a cable's length squared], is at rest.
+_REST = 1e-9
 
 
 @dataclass(frozen=True)
@@ -116,21 +118,31 @@ def _slack(tape, s, link):
     return -link_half_square(s, link, tape, length), rate
 
 
+@inner
+def _apart(gap, rate, rest, dt):
+    """Whether a gap is open or closing: not at rest at 0, where there is no impact to resolve."""
+    return (gap > rest) | (rate * dt > rest) | (rate * dt < splat(0.0) - rest)
+
+
 @stage
 def note_gaps(tape, s, skip, part):
     """At the start of a part of the step: gaps and what may close; leave out what is on trial, set how it rebounds."""
     zero = splat(0.0)
     one = splat(1.0)
     half = splat(0.5)
+    dt = load(s, tape[H_DT])
     trial = load(s, tape[H_TRIAL]) > half
     event = tape[H_EVENTS]
     at = tape[H_CONTACTS]
     for index in range(tape[at]):
         contact = at + 1 + CONTACT * index
         decided = tape[contact + 18]
+        gap = load(s, tape[contact + 17])
+        rate = contact_speed(s, tape, contact, 0)
         free = (load(s, tape[contact + 15]) <= zero) & (load(s, decided + 3) < half)
-        store(s, event + _GAP, load(s, tape[contact + 17]))
-        store(s, event + _RATE, contact_speed(s, tape, contact, 0))
+        free = free & _apart(gap, rate, splat(_REST), dt)
+        store(s, event + _GAP, gap)
+        store(s, event + _RATE, rate)
         store(s, event + _FREE, select(free, one, zero))
         near = load(s, decided)
         store(s, decided, select(trial & free, zero, near))
@@ -146,7 +158,10 @@ def note_gaps(tape, s, skip, part):
         link = at + 1 + LINK * index
         if tape[link + 10] != 0:
             gap, rate = _slack(tape, s, link)
+            length = load(s, tape[link + 8])
             free = (load(s, tape[link + 12]) <= zero) & (load(s, tape[link + 14] + 1) < half)
+            free = free & _apart(gap, rate, splat(_REST) * length * length, dt)
+            store(s, tape[link + 14] + 4, select(trial & free, one, zero))
             store(s, event + _GAP, gap)
             store(s, event + _RATE, rate)
             store(s, event + _FREE, select(free, one, zero))

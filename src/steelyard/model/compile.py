@@ -309,9 +309,8 @@ class Compiler:
     def _events(self) -> None:
         """Where impacts divide the step: copies of the state and notes of what may close."""
         header = self.header
-        header["trial"] = self.zero
         header["impacts"] = getattr(self.method.integrator, "impacts", 0)
-        header["events"] = header["kept"] = header["damping_rates"] = -1
+        header["events"] = header["kept"] = header["trial"] = header["damping_rates"] = -1
         if self.method.integrator.splits:
             closing = len(self.contacts) + sum(map(self.is_cable, self.links))
             header["events"] = self.take(EVENT * closing)

@@ -62,7 +62,7 @@ def add_links(c: Compiler) -> None:
                 c.at("impulse", other),
                 c.header["inverse_mass"] + c.of(other),
             )
-        work = c.take(7) if staged else -1
+        work = c.take(8) if staged else -1
         records += [
             c.at("position", a), b[0], c.at("velocity", a), b[1], c.at("impulse", a), b[2],
             c.header["inverse_mass"] + c.of(a), b[3], length_row, rate_row, int(cable), restitution,

@@ -16,7 +16,6 @@ from ..model.tape import (
     H_MASK,
     H_RIDERS,
     H_TOLERANCE,
-    H_TRIAL,
     H_USED_MASK,
     LINK,
 )
@@ -109,12 +108,11 @@ def withdraw(tape, s, skip, velocity, worlds, single):
 
 @inner
 def tighten(tape, s, velocity, dt, worlds, single):
-    """Take up slack cables that overstretch, all or the lowest only; none on trial. Worlds that changed."""
+    """Take up slack cables that overstretch, all or the lowest only; none that is on trial. Worlds that changed."""
     zero = splat(0.0)
     one = splat(1.0)
     half = splat(0.5)
     changed = zero > zero
-    worlds = worlds & (load(s, tape[H_TRIAL]) < half)
     at = tape[H_LINKS]
     for index in range(tape[at]):
         link = at + 1 + LINK * index
@@ -122,6 +120,7 @@ def tighten(tape, s, velocity, dt, worlds, single):
             slot = tape[H_MASK] + tape[link + 15]
             error, allowed = link_error(tape, s, link, velocity, dt)
             tightens = worlds & (load(s, slot) < half) & (error > allowed)
+            tightens = tightens & (load(s, tape[link + 14] + 4) < half)
             if velocity:
                 held = load(s, tape[link + 14] + 1) > half
                 tightens = tightens & ((load(s, tape[link + 12]) > zero) | held)
