@@ -4,7 +4,7 @@
 
 For each: the method that ``choose_method`` picks is run and scored by the problem's own errors, and its cost is held
 against that of the cheapest method known there. Costs are of the charts: what a step took, over the largest step
-that holds the tolerance, found between two rungs of the ladder by the slope between them.
+that holds the tolerance with all shorter ones, found between two rungs of the ladder by the slope between them.
 """
 
 from __future__ import annotations
@@ -130,7 +130,12 @@ def cheapest(points: Sequence[Mapping[str, Any]], tolerance: float) -> dict[str,
         )
         step = step_cost(points, name)
         for k, (dt, error) in enumerate(curve):
-            if error <= tolerance and step is not None:
+            # One rung that holds between others that do not is luck.
+            if (
+                error <= tolerance
+                and step is not None
+                and all(e <= tolerance for _, e in curve[k:])
+            ):
                 if k > 0 and curve[k - 1][1] > error:
                     longer, larger = curve[k - 1]
                     slope = math.log(larger / error) / math.log(longer / dt)

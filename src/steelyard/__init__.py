@@ -18,7 +18,7 @@ from .integrators.symplectic_euler import SymplecticEuler
 from .kernel import inner, kernel
 from .math.random import normal, uniform, uniform_between
 from .methods import Method
-from .scene.contacts import ContactGenerator, Ground, LinePlatform
+from .scene.contacts import Collisions, ContactGenerator, Ground, LinePlatform
 from .scene.forces import (
     AnchoredBungee,
     AnchoredSpring,
@@ -53,6 +53,7 @@ __all__ = [
     "Candidate",
     "Choice",
     "ClosedForm",
+    "Collisions",
     "ComposedRattle",
     "Considered",
     "ContactGenerator",

@@ -32,7 +32,7 @@ from .integrators.rk4 import RungeKutta4
 from .integrators.symplectic_euler import SymplecticEuler
 from .methods import Method
 from .scene import checks
-from .scene.contacts import ContactGenerator, Ground, LinePlatform
+from .scene.contacts import Collisions, ContactGenerator, Ground, LinePlatform
 from .scene.links import Cable, CableConstraint, Rod, RodConstraint
 from .scene.rider import Rider
 from .scene.scene import Scene
@@ -98,6 +98,8 @@ _MOST = 400_000
 #: Share of the tolerance that the reference may err by, and that is aimed at and accepted of the rest.
 _REFERENCE, _AIM, _ACCEPT = 0.05, 0.8, 0.95
 _TRIES = 12
+#: Height [m] whose energy is the least that errors of energy are held against.
+_LIFT = 1.0
 #: Where errors do not fall smoothly, as after impacts, one step may hold by luck: these many more must hold too.
 _NEIGHBOURS = (1.07, 1.19, 1.37)
 
@@ -167,7 +169,8 @@ class Choice:
 class _Track:
     """One run, at the looks that count: positions (looks, particles, 3), energies (looks,), worst residual of a link.
 
-    ``scale`` is what errors of the energy are a share of: the most kinetic energy, or the range of the energy.
+    ``scale`` is what errors of the energy are a share of: the most kinetic energy, the range of the energy, or what
+    lifts all particles by a metre, since an error of places allows as much.
     """
 
     position: np.ndarray
@@ -243,14 +246,18 @@ class _Runs:
                 residual = max(residual, float(np.abs(links).max()))
             speed = world.particles.velocity[0]
             kinetic = max(kinetic, 0.5 * float(world.particles.mass_or_zero[0] @ (speed**2).sum(1)))
-        scale = max(float(np.ptp(energy)), kinetic)
+        particles = world.particles
+        weight = float(
+            particles.mass_or_zero[0] @ np.linalg.norm(particles.acceleration[0], axis=1)
+        )
+        scale = max(float(np.ptp(energy)), kinetic, weight * _LIFT)
         first = self._first
         return _Track(np.stack(position[first:]), np.array(energy[first:]), residual, scale)
 
 
 def candidates(scene: Scene) -> Iterator[Candidate]:
     """The candidates that can step a scene; with a solver, or with resolved impacts, only where there may be any."""
-    impacts = bool(scene.of(Cable, CableConstraint, Ground, LinePlatform))
+    impacts = bool(scene.of(Cable, CableConstraint, Ground, LinePlatform, Collisions))
     held = bool(
         scene.of(
             Rod,
@@ -260,6 +267,7 @@ def candidates(scene: Scene) -> Iterator[Candidate]:
             Rider,
             Ground,
             LinePlatform,
+            Collisions,
             ContactGenerator,
         )
     )
@@ -360,8 +368,8 @@ def choose_method(
 
     Args:
         scene: what is to be stepped.
-        tolerance: largest error [m] of a particle's place, and largest share of error of the energy (beside
-            the kinetic energy or the range of the energy, whichever is larger) and of a link's length.
+        tolerance: largest error [m] of a particle's place, and largest share of error of the energy (beside the largest
+            of the kinetic energy, the range of the energy, and what lifts all by a metre) and of a link's length.
         horizon: how long the tolerance must hold [s].
         since: from when on errors count [s], within the horizon; for scenes that come to rest, of which only
             the rest matters.

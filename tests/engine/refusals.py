@@ -35,7 +35,7 @@ def pair(**settings: Any) -> tuple[sy.Scene, sy.Particle, sy.Particle]:
     """A scene of two particles one metre apart."""
     scene = sy.Scene()
     a = scene.add(sy.Particle(position=(0, 2, 0), **settings))
-    b = scene.add(sy.Particle(position=(1, 2, 0)))
+    b = scene.add(sy.Particle(position=(1, 2, 0), radius=0.1))
     return scene, a, b
 
 
@@ -61,6 +61,7 @@ def things(a: sy.Particle, b: sy.Particle) -> list[Any]:
         sy.Rider(b, [a]),
         sy.Ground(particles=some),
         sy.LinePlatform(start=ORIGIN, end=(1, 0, 0), radius=0.1, particles=some),
+        sy.Collisions(particles=some),
         sy.ContactGenerator(no_contact, [(b, a)]),
         sy.ContactGenerator(no_contact, [(a, None)]),
         sy.Gravity((0, 1, 0), particles=some),

@@ -51,6 +51,10 @@ NUMBERS: dict[type, tuple[Callable[..., Any], dict[str, list[float]]]] = {
         lambda **k: sy.LinePlatform(start=ORIGIN, end=(1, 0, 0), **({"radius": 0.1} | k)),
         {"radius": [-0.1], "restitution": [-0.1, 1.1], "friction": [-0.1]},
     ),
+    sy.Collisions: (
+        lambda **k: sy.Collisions(**k),
+        {"restitution": [-0.1, 1.1], "friction": [-0.1]},
+    ),
     sy.ContactGenerator: (
         lambda **k: sy.ContactGenerator(no_contact, [(A, B)], **k),
         {"restitution": [-0.1, 1.1], "friction": [-0.1]},
@@ -275,6 +279,7 @@ CHOOSING: list[Callable[..., Any]] = [
     lambda some: sy.Drag(linear=1.0, particles=some),
     lambda some: sy.UserForce(no_force, particles=some),
     lambda some: sy.Ground(particles=some),
+    lambda some: sy.Collisions(particles=some),
     lambda some: sy.LinePlatform(start=ORIGIN, end=(1, 0, 0), radius=0.1, particles=some),
 ]
 

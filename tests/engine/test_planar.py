@@ -97,6 +97,8 @@ def contacts(planar: bool) -> sy.Scene:
             particles=[ball],
         )
     )
+    scene.add(sy.Particle(position=(3.3, 0.6, 0.0), velocity=(-0.5, 0.0, 0.0), radius=0.1))
+    scene.add(sy.Collisions(particles=scene.particles[-2:], restitution=0.6, friction=0.1))
     return scene
 
 

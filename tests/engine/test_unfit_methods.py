@@ -14,7 +14,7 @@ from steelyard.scene.scene import CONTACTS, FORCES, LINKS
 from tests.engine.refusals import ORIGIN, pair, refused, things
 
 NAN, INF = math.nan, math.inf
-A = sy.Particle(position=(0, 0, 0))
+A = sy.Particle(position=(0, 0, 0), radius=0.1)
 B = sy.Particle(position=(1, 0, 0))
 
 

@@ -132,6 +132,10 @@ ASSIGNED: dict[str, tuple[Callable[..., Any], dict[str, list[Any]]]] = {
             "friction": [-0.1],
         },
     ),
+    "Collisions": (
+        lambda a, b, c: sy.Collisions(particles=[a, c]),
+        {"restitution": [-0.1, 1.1], "friction": [-0.1]},
+    ),
     "ContactGenerator": (
         lambda a, b, c: sy.ContactGenerator(no_contact, [(a, b)]),
         {"restitution": [-0.1, 1.1], "friction": [-0.1]},

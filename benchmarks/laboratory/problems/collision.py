@@ -20,17 +20,9 @@ def scene(
 ) -> sy.Scene:
     """Two balls that approach along x."""
     made = sy.Scene(gravity=(0.0, 0.0, 0.0))
-    a = made.add(sy.Particle(position=(0, 0, 0), velocity=(speed, 0, 0), mass=masses[0]))
-    b = made.add(
-        sy.Particle(position=(GAP + 2 * RADIUS, 0, 0), velocity=(SPEEDS[1], 0, 0), mass=masses[1])
-    )
-
-    def touch(first: Array, second: Array, time: Array) -> tuple[Array, Array]:
-        apart = first - second
-        distance = np.linalg.norm(apart, axis=2)
-        return apart / distance[:, :, None], 2 * RADIUS - distance
-
-    made.add(sy.ContactGenerator(touch, [(a, b)], restitution=restitution))
+    for x, v, mass in zip((0.0, GAP + 2 * RADIUS), (speed, SPEEDS[1]), masses, strict=True):
+        made.add(sy.Particle(position=(x, 0, 0), velocity=(v, 0, 0), mass=mass, radius=RADIUS))
+    made.add(sy.Collisions(restitution=restitution))
     return made
 
 

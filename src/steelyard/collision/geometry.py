@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from ..kernel import inner
 from ..math.lanes import fma, load, select, splat, sqrt, store
-from ..model.tape import CONTACT, GROUND, H_CONTACTS, LINE
+from ..math.vectors import dot, load_vector, store_vector
+from ..model.tape import BALLS, CONTACT, GROUND, H_CONTACTS, LINE
 
 
 @inner
@@ -50,6 +51,24 @@ def _line(s, contact, tape):
 
 
 @inner
+def _balls(s, contact, tape):
+    """Two balls: from the second to the first; up where they coincide."""
+    zero = splat(0.0)
+    ax, ay, az = load_vector(s, tape[contact + 1])
+    bx, by, bz = load_vector(s, tape[contact + 2])
+    x = ax - bx
+    y = ay - by
+    z = az - bz
+    distance = sqrt(dot(x, y, z, x, y, z))
+    apart = distance > zero
+    inverse = splat(1.0) / select(apart, distance, splat(1.0))
+    up = select(apart, y * inverse, splat(1.0))
+    store_vector(s, tape[contact + 16], x * inverse, up, z * inverse)
+    reach = load(s, tape[contact + 11]) + load(s, tape[contact + 12])
+    store(s, tape[contact + 17], distance - reach)
+
+
+@inner
 def _user(s, contact, tape):
     """Written by the user: normal and penetration lie in the state; 0 or less is no contact."""
     given = tape[contact + 11]
@@ -91,6 +110,8 @@ def contact_geometry(tape, s):
             _ground(s, contact, tape)
         elif kind == LINE:
             _line(s, contact, tape)
+        elif kind == BALLS:
+            _balls(s, contact, tape)
         else:
             _user(s, contact, tape)
         _tangents(s, tape[contact + 16])

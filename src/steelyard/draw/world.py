@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..scene.contacts import ContactGenerator, Ground, LinePlatform
+from ..scene.contacts import Collisions, ContactGenerator, Ground, LinePlatform
 from ..scene.forces import (
     AnchoredBungee,
     AnchoredSpring,
@@ -87,7 +87,7 @@ class _WorldDrawing:
         for thing in scene.of(Spring, Bungee, AnchoredSpring, AnchoredBungee, StiffSpring):
             self._spring(thing)
         self._particles()
-        for generator in scene.of(Ground, LinePlatform, ContactGenerator):
+        for generator in scene.of(Ground, LinePlatform, Collisions, ContactGenerator):
             self._contacts(generator)
         if forces:
             self._forces()
@@ -194,6 +194,14 @@ class _WorldDrawing:
                 given = self.world.state[row : row + 4, self.index]
                 if given[3] > 0.0:
                     self._touch(self._of(particle), given[:3])
+            return
+        if isinstance(generator, Collisions):
+            for a, b in generator.pairs_of(self.world.scene.particles):
+                apart = self._of(a) - self._of(b)
+                distance = float(np.linalg.norm(apart))
+                radius, other = (float(radii[self.world._index(p)]) for p in (a, b))
+                if 0.0 < distance < radius + other + _NEAR * self.extent:
+                    self._touch(self._of(a) - radius / distance * apart, apart / distance)
             return
         chosen = generator.particles
         movable = [p for p in self.world.scene.particles if p.movable]

@@ -10,13 +10,8 @@ import numpy as np
 from ..integrators.base import Acting, Recipe
 from ..math.pointers import LANES
 from ..methods import Method
-from ..scene.contacts import (
-    ContactGenerator,
-)
-from ..scene.forces import (
-    StiffSpring,
-    UserForce,
-)
+from ..scene.contacts import Collisions, ContactGenerator
+from ..scene.forces import StiffSpring, UserForce
 from ..scene.links import Cable, CableConstraint
 from ..scene.particle import Particle
 from ..scene.rider import Rider
@@ -169,6 +164,9 @@ class Compiler:
         for generator in self.scene.of(*CONTACTS):
             if isinstance(generator, ContactGenerator):
                 pairs.extend((generator, a, b, k) for k, (a, b) in enumerate(generator.pairs))
+            elif isinstance(generator, Collisions):
+                met = generator.pairs_of(self.particles)
+                pairs.extend((generator, a, b, k) for k, (a, b) in enumerate(met))
             else:
                 chosen = generator.particles
                 some = [p for p in self.particles if p.movable] if chosen is None else chosen

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..scene.contacts import (
+    Collisions,
     ContactGenerator,
     Ground,
     LinePlatform,
@@ -14,10 +15,11 @@ from ..scene.contacts import (
     check_thickness,
 )
 from ..scene.links import CableConstraint, RodConstraint
+from ..scene.particle import Particle
 from ..scene.rider import Rider
 from .compliances import springs_of
 from .parameters import PARTICLES
-from .tape import CONTACT, GROUND, LINE, USER
+from .tape import BALLS, CONTACT, GROUND, LINE, USER
 
 if TYPE_CHECKING:
     from .compile import Compiler
@@ -112,6 +114,15 @@ def add_contacts(c: Compiler) -> None:
     surfaces: dict[int, tuple[int, int, int]] = {}
     staged = c.staged
     radii: dict[int, int] = {}
+
+    def radius(particle: Particle) -> int:
+        if id(particle) not in radii:
+            index = c.of(particle)
+            radii[id(particle)] = c.slot(
+                1, ((PARTICLES, "radius"),), lambda value: value[index : index + 1]
+            )
+        return radii[id(particle)]
+
     for generator, a, b, k in c.contacts:
         if id(generator) not in surfaces:
             restitution = c.parameter(generator, "restitution", generator.restitution)
@@ -121,11 +132,8 @@ def add_contacts(c: Compiler) -> None:
         kind = GROUND if isinstance(generator, Ground) else LINE
         if isinstance(generator, ContactGenerator):
             kind, place = USER, c.place(generator, f"pair {k}")
-        if id(a) not in radii:
-            index = c.of(a)
-            radii[id(a)] = c.slot(
-                1, ((PARTICLES, "radius"),), lambda value, i=index: value[i : i + 1]
-            )
+        elif isinstance(generator, Collisions) and b is not None:
+            kind, place = BALLS, radius(b)
         spare = c.header["impulse"] + 3 * len(c.particles)
         z = c.zero
         other = (
@@ -143,7 +151,7 @@ def add_contacts(c: Compiler) -> None:
         records += [
             kind, c.at("position", a), other[0], c.at("velocity", a), other[1],
             c.at("impulse", a), other[2], c.header["inverse_mass"] + c.of(a), other[3],
-            c.at("acceleration", a), other[4], place, radii[id(a)], restitution, friction,
+            c.at("acceleration", a), other[4], place, radius(a), restitution, friction,
             c.place(generator, f"multiplier {k}") if staged else -1, c.take(9), c.take(1),
             c.take(7) if staged else -1, -1, len(records) // CONTACT, c.at("start", a), other[5],
             c.take(6) if staged else -1,

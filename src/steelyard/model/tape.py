@@ -129,4 +129,4 @@ ARM, BEFORE, AFTER, MOTION, LOAD_ROWS = 0, 3, 6, 9, 12
 FRESH, HASTY, WORDS = range(3)
 
 # Codes of contact geometries.
-GROUND, LINE, USER = range(3)
+GROUND, LINE, USER, BALLS = range(4)

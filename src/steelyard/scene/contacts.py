@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 from typing import Any, ClassVar
 
 import numpy as np
@@ -113,6 +114,59 @@ def check_thickness(radius: float, particles: Iterable[Particle]) -> None:
                 f"{particle.position} is 0.0; one of them must be greater than 0, or they never "
                 "touch. Give one a radius, or name only particles that have one."
             )
+
+
+@dataclass(eq=False, kw_only=True)
+class Collisions:
+    """Particles as balls of their radius, none of which can enter another.
+
+    Every pair costs three rows in a solver: name only those that can meet. Two balls whose centres coincide push each
+    other up and down.
+
+    Args:
+        restitution: rebound speed over approach speed, in [0, 1].
+        friction: Coulomb coefficient, at least 0. A particle does not turn: friction acts at its centre.
+        particles: those that can meet; all of the scene by default.
+    """
+
+    restitution: float = 0.0
+    friction: float = 0.0
+    particles: Sequence[Particle] | None = None
+
+    LIMITS: ClassVar[dict[str, checks.Rule]] = _SURFACE
+
+    def __post_init__(self) -> None:
+        checks.numbers(self, "restitution", "friction")
+        check_particles(self, "particles")
+
+    def pairs_of(self, everything: Sequence[Particle]) -> list[tuple[Particle, Particle]]:
+        """Pairs that can meet, given all particles of the scene; the first of each is movable."""
+        chosen = everything if self.particles is None else self.particles
+        return [
+            (a, b) if a.movable else (b, a)
+            for a, b in combinations(chosen, 2)
+            if a.movable or b.movable
+        ]
+
+    def check(self, everything: Sequence[Particle]) -> None:
+        """Refuse what can never happen.
+
+        Raises:
+            ValueError: no pair, or one of two particles without a radius.
+        """
+        pairs = self.pairs_of(everything)
+        if not pairs:
+            count = len(everything if self.particles is None else self.particles)
+            raise ValueError(
+                f"Collisions: {count} particles make 0 pairs; it must be at least 1, of which one can move. "
+                "Name two particles."
+            )
+        for a, b in pairs:
+            if a.radius == 0.0 and b.radius == 0.0:
+                raise ValueError(
+                    f"Collisions: radius is 0.0 for the particles at {a.position} and {b.position}; one of "
+                    "them must be greater than 0, or they never touch. Give one a radius."
+                )
 
 
 @dataclass(eq=False)

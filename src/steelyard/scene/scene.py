@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from . import checks
-from .contacts import ContactGenerator, Ground, LinePlatform, check_thickness
+from .contacts import Collisions, ContactGenerator, Ground, LinePlatform, check_thickness
 from .forces import (
     AnchoredBungee,
     AnchoredSpring,
@@ -25,7 +25,7 @@ from .particle import Particle
 from .rider import Rider
 
 LINKS = (Rod, RodConstraint, Cable, CableConstraint)
-CONTACTS = (Ground, LinePlatform, ContactGenerator)
+CONTACTS = (Ground, LinePlatform, Collisions, ContactGenerator)
 FORCES = (
     Gravity,
     Drag,
@@ -136,7 +136,7 @@ class Scene:
 
     def touched(self, thing: Any) -> list[Particle]:
         """The particles that a link, rider or contact generator may push."""
-        if isinstance(thing, Ground | LinePlatform) and thing.particles is None:
+        if isinstance(thing, Ground | LinePlatform | Collisions) and thing.particles is None:
             return [particle for particle in self.particles if particle.movable]
         return list(members(thing))
 
@@ -144,7 +144,7 @@ class Scene:
         """Make sure that worlds of this scene mean something.
 
         Raises:
-            ValueError: no particle, or a line platform that one of its particles can never touch.
+            ValueError: no particle, a line platform that one of its particles can never touch, or collisions of none.
         """
         if not self.particles:
             raise ValueError(
@@ -152,6 +152,8 @@ class Scene:
             )
         for line in self.of(LinePlatform):
             check_thickness(line.radius, self.touched(line))
+        for collisions in self.of(Collisions):
+            collisions.check(self.particles)
 
     def of(self, *kinds: type) -> list[Any]:
         """The things of exactly these kinds, in the order they were added."""
