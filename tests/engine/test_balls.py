@@ -24,13 +24,16 @@ def pair(restitution: float, friction: float = 0.0) -> sy.Scene:
 
 
 def collided(name: str, restitution: float, friction: float = 0.0) -> tuple[np.ndarray, sy.World]:
-    """The pair just after it has collided, and its normal at the start of that step."""
+    """The pair just after it has collided, and its normal where the method looks for contacts."""
     world = sy.World(pair(restitution, friction), method=undivided(name, dt=1 / 120))
     before = world.particles.velocity[0].copy()
     for _ in range(120):
         apart = np.subtract(*world.particles.position[0])
         world.step()
         if np.abs(world.particles.velocity[0] - before).max() > 1e-6:
+            if name.endswith("WorstFirst"):
+                # It looks for contacts after the motion.
+                apart = apart + world.method.substep * np.subtract(*before)
             return apart / np.linalg.norm(apart), world
     raise AssertionError("the balls pass through each other")
 
@@ -38,7 +41,7 @@ def collided(name: str, restitution: float, friction: float = 0.0) -> tuple[np.n
 @pytest.mark.parametrize("name", STEPWISE)
 @pytest.mark.parametrize("restitution", [0.0, 0.5, 1.0])
 def test_law_of_collision(name: str, restitution: float) -> None:
-    # v' = v - (1 + e) m_r (v_rel . n) n / m, along the normal at the step's start.
+    # v' = v - (1 + e) m_r (v_rel . n) n / m.
     normal, world = collided(name, restitution)
     a, b = np.array([2.0, 0.0, 0.0]), np.array([-1.0, 0.3, 0.1])
     impulse = (1.0 + restitution) * 0.75 * ((a - b) @ normal) * normal

@@ -122,8 +122,8 @@ def test_a_wrong_engine_is_no_reference() -> None:
 
 
 def test_what_nothing_reaches_is_refused_with_the_best_there_is() -> None:
-    with pytest.raises(ValueError, match=r"1e-12 over 2 s .*best that can be had is \d.*Ask for"):
-        sy.choose_method(ball(), tolerance=1e-12, horizon=2.0)
+    with pytest.raises(ValueError, match=r"1e-15 over 2 s .*best that can be had is \d.*Ask for"):
+        sy.choose_method(ball(), tolerance=1e-15, horizon=2.0)
 
 
 def test_world_takes_a_tolerance() -> None:

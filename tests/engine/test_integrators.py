@@ -26,7 +26,9 @@ SMOOTH_METHODS = [
 STEPPING = [sy.ExplicitEuler(), sy.SymplecticEuler(), sy.Rattle(), *SMOOTH_METHODS]
 # Parts of whose step run backwards in time; they refuse drag and stiff springs.
 COMPOSED = [sy.ComposedRattle(substeps=substeps) for substeps in (3, 5, 9)]
-INTEGRATORS: list[Any] = [*STEPPING, *COMPOSED, sy.ClosedForm()]
+# Whose step impacts divide; it refuses drag and stiff springs too.
+DIVIDED = [sy.ImpactRattle()]
+INTEGRATORS: list[Any] = [*STEPPING, *COMPOSED, *DIVIDED, sy.ClosedForm()]
 # Whose damping is a closed form.
 DAMPING_EXACTLY = [
     sy.ExplicitEuler(),
@@ -141,11 +143,11 @@ SMOOTH: dict[str, Smooth] = {
 
 
 @pytest.mark.parametrize("name", SMOOTH)
-@_over([*STEPPING, *COMPOSED])
+@_over([*STEPPING, *COMPOSED, *DIVIDED])
 def test_order_on_smooth_motion(integrator: Any, name: str) -> None:
     if name == "user force of time" and not integrator.evaluations:
         pytest.skip("refused")
-    if "drag" in name and integrator in COMPOSED:
+    if "drag" in name and integrator in (*COMPOSED, *DIVIDED):
         pytest.skip("refused")
     force, add, damping = SMOOTH[name]
 

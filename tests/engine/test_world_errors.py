@@ -133,7 +133,7 @@ ASSIGNED: dict[str, tuple[Callable[..., Any], dict[str, list[Any]]]] = {
         },
     ),
     "Collisions": (
-        lambda a, b, c: sy.Collisions(particles=[a, c]),
+        lambda a, b, c: sy.Collisions(particles=[a, b]),
         {"restitution": [-0.1, 1.1], "friction": [-0.1]},
     ),
     "ContactGenerator": (

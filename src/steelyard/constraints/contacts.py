@@ -14,6 +14,8 @@ from ..model.tape import CONTACT, GROUND, H_CONTACTS, H_TOLERANCE
 
 # Share of a penetration found at the start that one step takes back.
 _RECOVERY = 0.2
+# Share of the tolerance below which what an impulse moves is nothing.
+_IDLE = 1e-2
 
 
 @inner
@@ -66,8 +68,13 @@ def contact_targets(tape, s, dt, skip):
             weight = fma(relative, relative, weight)
         reach = dt * (sqrt(square) + dt * sqrt(weight))
         near = gap < splat(4.0) * reach
-        carried = load(s, tape[contact + 15]) > zero
-        low = gap < splat(-10.0) * load(s, tape[H_TOLERANCE]) - splat(1e-9)
+        tolerance = load(s, tape[H_TOLERANCE])
+        # A load that moves nothing is rounding, but would push for ever.
+        push = load(s, tape[contact + 15]) * (
+            load(s, tape[contact + 7]) + load(s, tape[contact + 8])
+        )
+        carried = push > splat(_IDLE) * tolerance
+        low = gap < splat(-10.0) * tolerance - splat(1e-9)
         leaves = low & (speed * dt > splat(-_RECOVERY) * gap)
         near = (near | carried) & (select(leaves, one, zero) < splat(0.5))
         # An impact this step: closing, and the surface lies within what speed and acceleration cover.
@@ -81,7 +88,7 @@ def contact_targets(tape, s, dt, skip):
         store(s, tape[contact + 18] + 3, select(low, one, zero))
         for axis in range(3):
             row = tape[contact + 15] + axis
-            store(s, row, select(near, load(s, row), zero))
+            store(s, row, select(near & carried, load(s, row), zero))
         left_out = 0 if any_lane(near) else 1
         changed = changed or skip[tape[contact + 20]] != left_out or tape[contact] != GROUND
         skip[tape[contact + 20]] = left_out

@@ -23,7 +23,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from ..collision.geometry import contact_geometry
-from ..constraints.contacts import contact_speed
+from ..constraints.contacts import contact_shift, contact_speed
 from ..constraints.controls import move_controls
 from ..constraints.links import link_half_square, link_rate
 from ..kernel import inner
@@ -57,8 +57,9 @@ from .base import Acting, Integrator, Recipe
 from .rattle import rattle_halves
 
 # Rows of an event: gap [m] or slack (L^2 - d^2)/2, and its rate, where the part of the step begins; whether it may
-# close, closes in this part, and at which rate it leaves.
-_GAP, _RATE, _FREE, _CLOSES, _LEAVES = range(5)
+# close, closes in this part, and at which rate it leaves; of a contact also its frame at the impact, and what its gap
+# along that frame is where the part begins.
+_GAP, _RATE, _FREE, _CLOSES, _LEAVES, _BEFORE, _FRAME = range(7)
 _TRIALS = 3
 _BISECTIONS = 50
 # Shortest part of a step, and how far past the impact it goes, so that the contact is felt, over the step.
@@ -152,6 +153,11 @@ def note_gaps(tape, s, skip, part):
         store(s, decided + 2, bounce)
         if any_lane(closes):
             skip[tape[contact + 20]] = 0
+            row = tape[contact + 17]
+            store(s, row, select(closes, load(s, event + _BEFORE), gap))
+            for k in range(9):
+                row = tape[contact + 16] + k
+                store(s, row, select(closes, load(s, event + _FRAME + k), load(s, row)))
         event += EVENT
     at = tape[H_LINKS]
     for index in range(tape[at]):
@@ -256,6 +262,10 @@ def _note_impacts(tape, s, meets, near):
         rate = contact_speed(s, tape, contact, 0)
         gap = load(s, tape[contact + 17])
         _note(s, event, gap, rate, load(s, tape[contact + 13]), meets, near)
+        moved = contact_shift(s, tape, contact, 0)
+        store(s, event + _BEFORE, gap - moved)
+        for k in range(9):
+            store(s, event + _FRAME + k, load(s, tape[contact + 16] + k))
         event += EVENT
     at = tape[H_LINKS]
     for index in range(tape[at]):

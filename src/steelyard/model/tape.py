@@ -114,7 +114,7 @@ CONTACT = 24
 SADDLE_LINK = 10
 COMPLIANCE = 10
 # Work rows of a contact or cable whose impact is resolved inside the step.
-EVENT = 5
+EVENT = 15
 
 # Records of clusters and of loads on them: what comes before their lists, and an entry of a cluster's. Work rows of a
 # cluster: inertia, inverse of that with loads, quaternion (angular velocity in the velocity stage), shift of the centre
