@@ -1,4 +1,5 @@
-"""Methods for links beside MuJoCo: the cost of a step of chains with heavy ends, and a pendulum to 1e-6 m.
+"""Methods for links beside MuJoCo and beside each other: a step of chains with heavy ends, the direct solver and ten
+sweeps, a pendulum to 1e-6 m.
 
 Chains of twenty links of 1 m, let go level, in maximal coordinates on both sides: worlds differ by how they were
 shaken, a tenth of a millimetre a second at most, so that none meets an easier stretch than another. MuJoCo steps at
@@ -20,9 +21,9 @@ from benchmarks.engine_scenes import build
 from benchmarks.figures import Announce, Figure
 from benchmarks.peers import mujoco_scenes
 from benchmarks.references import pendulum
-from benchmarks.scenes import ParticleScene
+from benchmarks.scenes import ParticleScene, bridge
 
-STAGES = ("chains", "pendulum")
+STAGES = ("chains", "sweeps", "pendulum")
 LINKS = 20
 WORLDS = 1024
 #: End mass over that of the others, and what the method keeps of unresolved oscillations.
@@ -56,6 +57,8 @@ def run(*, quick: bool, output: Path, announce: Announce) -> list[Figure]:
             Figure(name=f"{name}: cost beside MuJoCo", measured=ours / theirs, at_most=0.2),
             Figure(name=f"{name}: worlds that settled", measured=settled, at_least=1.0),
         ]
+    announce("sweeps")
+    figures += sweep_costs(worlds=worlds, repeats=repeats)
     announce("pendulum")
     figures += pendulum_costs(worlds=worlds, repeats=repeats)
     payload = {"quick": quick, "worlds": worlds, "figures": [figure.record() for figure in figures]}
@@ -63,17 +66,17 @@ def run(*, quick: bool, output: Path, announce: Announce) -> list[Figure]:
     return figures
 
 
-def heavy_chain(ratio: float) -> ParticleScene:
-    """Twenty links level from the origin, the last particle `ratio` kg, the others 1 kg."""
-    position = np.zeros((LINKS, 3))
-    position[:, 0] = np.arange(1, LINKS + 1)
-    mass = np.ones(LINKS)
+def heavy_chain(ratio: float, *, links: int = LINKS) -> ParticleScene:
+    """Links level from the origin, the last particle `ratio` kg, the others 1 kg."""
+    position = np.zeros((links, 3))
+    position[:, 0] = np.arange(1, links + 1)
+    mass = np.ones(links)
     mass[-1] = ratio
     return ParticleScene(
         position=position,
         velocity=np.zeros((LINKS, 3)),
         mass=mass,
-        rods=tuple((k, k + 1, 1.0) for k in range(LINKS - 1)),
+        rods=tuple((k, k + 1, 1.0) for k in range(links - 1)),
         pins=((0, (0.0, 0.0, 0.0), 1.0),),
     )
 
@@ -99,6 +102,43 @@ def chain_costs(
     )
     settled = float((world.health == 0).mean())
     return times["ours"] / steps / worlds, times["theirs"] / (10 * steps), settled
+
+
+def sweep_costs(*, worlds: int, repeats: int) -> list[Figure]:
+    """The direct solver beside ten sweeps of Gauss-Seidel: cost of a step, and what each leaves of the links."""
+    scenes = {f"chain of {links}": heavy_chain(1.0, links=links) for links in (3, 5, 10, 20)}
+    figures = []
+    for name, scene in {**scenes, "bridge": bridge()}.items():
+        solvers = {"direct": sy.Direct(), "ten sweeps": sy.GaussSeidel(passes=10)}
+        running = {
+            solver: sy.World(
+                build(scene), worlds=worlds, method=sy.Method(sy.Rattle(), made, dt=0.01)
+            )
+            for solver, made in solvers.items()
+        }
+        random = np.random.default_rng(0)
+        kick = random.uniform(-SHAKEN, SHAKEN, running["direct"].particles.velocity.shape)
+        for world in running.values():
+            world.particles.velocity[:] += kick
+        times = record.interleave(
+            {solver: partial(world.step, STEPS) for solver, world in running.items()},
+            repeats=repeats,
+        )
+        for solver, world in running.items():
+            cost = 1e6 * times[solver] / STEPS / worlds
+            left = float(world.residual.max())
+            most = 1e-12 if solver == "direct" else None
+            figures += [
+                Figure(name=f"{name}: {solver}", measured=cost, unit="us/step"),
+                Figure(
+                    name=f"{name}: {solver}, residual", measured=left, unit="share", at_most=most
+                ),
+            ]
+        ratio = times["direct"] / times["ten sweeps"]
+        figures.append(
+            Figure(name=f"{name}: direct beside ten sweeps", measured=ratio, at_most=1.0)
+        )
+    return figures
 
 
 def pendulum_costs(*, worlds: int, repeats: int) -> list[Figure]:

@@ -13,6 +13,7 @@ from scipy.special import roots_laguerre
 pytest.importorskip("mujoco")
 pytest.importorskip("pymunk")
 
+import steelyard as sy
 from benchmarks import references
 from benchmarks.laboratory import pendulums
 from benchmarks.laboratory.problems import (
@@ -20,6 +21,7 @@ from benchmarks.laboratory.problems import (
     bungee,
     buoyancy,
     catenary,
+    cloth,
     collision,
     projectile,
 )
@@ -230,6 +232,17 @@ def test_stored_motions_are_what_their_program_makes() -> None:
         height = pendulums.GRAVITY * stored.position[:, :, 1] @ scene.mass
         # Let go level with the anchor: no energy at the start.
         np.testing.assert_allclose(kinetic + height, 0.0, rtol=0, atol=1e-9 * kinetic.max())
+
+
+def test_cloth_by_another_tolerance_and_by_small_steps_of_order_four() -> None:
+    stored = cloth.stored()
+    again = cloth.integrate(tolerance=1e-9)
+    np.testing.assert_allclose(again.position, stored.position, rtol=0, atol=1e-8)
+    world = sy.World(sy.scenes.cloth(), method=sy.Method(sy.RungeKutta4(), dt=cloth.STRETCH / 128))
+    for place, speed in zip(stored.position, stored.velocity, strict=True):
+        world.step(128)
+        np.testing.assert_allclose(world.particles.position[0], place, rtol=0, atol=1e-8)
+        np.testing.assert_allclose(world.particles.velocity[0], speed, rtol=0, atol=1e-5)
 
 
 def test_projectile_without_drag_is_the_limit_of_little_drag() -> None:

@@ -17,6 +17,7 @@ NAMES = (
     "platform",
     "bridge",
     "catenary",
+    "cloth",
     "collision",
     "bouncing_ball",
 )

@@ -65,7 +65,7 @@ def _problem(restitution: float) -> Problem:
         peers=_peers(restitution),
         peer_steps=(6, 24, 96, 384),
         omitted=single("contact"),
-        best="RATTLE, direct",
+        best="RATTLE, impacts inside, direct",
         wrong={
             "gravity points up": partial(build, gravity=-GRAVITY),
             "restitution .1 off": partial(scene, restitution=restitution - 0.1),

@@ -76,7 +76,7 @@ def _problem(restitution: float) -> Problem:
         steps=(3, 6, 24, 96),
         peers=_pymunk(restitution),
         omitted=single("contact"),
-        best="RATTLE, direct",
+        best="RATTLE, impacts inside, direct",
         wrong={
             "restitution .1 off": partial(scene, restitution=abs(restitution - 0.1)),
             "masses swapped": partial(build, masses=MASSES[::-1]),

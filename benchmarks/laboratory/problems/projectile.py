@@ -16,7 +16,7 @@ from scipy.integrate import solve_ivp
 
 import steelyard as sy
 from benchmarks.engine_scenes import build
-from benchmarks.laboratory.peers import mujoco_particles, pymunk_space
+from benchmarks.laboratory.peers import mujoco_document, mujoco_particles, pymunk_space
 from benchmarks.laboratory.problem import (
     Measure,
     Motion,
@@ -140,7 +140,7 @@ def problems() -> tuple[Problem, ...]:
                 impact(end),
             ),
             steps=(1, 2, 4, 8, 16, 48),
-            peers=_pymunk(QUADRATIC, 1.0),
+            peers={**_through_fluid(QUADRATIC), **_pymunk(QUADRATIC, 1.0)},
             best="velocity Verlet",
             wrong={
                 "drag left out": lambda: dragged(0.0),
@@ -188,6 +188,18 @@ def _free(name: str, damping: float, time: float, place: float) -> Problem:
             ),
         },
     )
+
+
+def _through_fluid(quadratic: float) -> dict[str, Peer]:
+    """MuJoCo's blunt drag of a ball in a fluid, whose force is density C pi r^2 v^2."""
+    radius, blunt = 1e-3, 0.5
+    density = quadratic * MASS / (blunt * math.pi * radius**2)
+    document = f"""<mujoco><option timestep="{{dt}}" integrator="{{integrator}}"
+    gravity="0 -9.81 0" density="{density!r}"><flag contact="disable"/></option><worldbody><body>
+    <freejoint/><geom type="sphere" size="{radius}" mass="{MASS}" fluidshape="ellipsoid"
+    fluidcoef="{blunt} 0 0 0 0"/><site name="p"/></body></worldbody></mujoco>"""
+    speed = np.array([SPEED, SPEED, 0.0, 0.0, 0.0, 0.0])
+    return mujoco_document(document, particles=["p"], velocity=speed)
 
 
 def _pymunk(quadratic: float, damping: float) -> dict[str, Peer]:
