@@ -1,6 +1,6 @@
 """How good the automatic choice is: on every reference problem, at tolerances from 1e-2 to 1e-8.
 
-    python -m benchmarks.laboratory.choices
+    python -m benchmarks.laboratory.choices [PROBLEM ...]
 
 For each: the method that ``choose_method`` picks is run and scored by the problem's own errors, and its cost is held
 against that of the cheapest method known there. Costs are of the charts: what a step took, over the largest step
@@ -11,7 +11,10 @@ from __future__ import annotations
 
 import json
 import math
+import sys
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 from typing import Any
 
 import numpy as np
@@ -25,17 +28,23 @@ from benchmarks.laboratory.engines import BrokenRunError, EngineRun
 from benchmarks.laboratory.problem import Problem, worst
 
 CHARTS = record.RESULTS / "charts"
+RESULTS = record.RESULTS / "choices.json"
 TOLERANCES = tuple(10.0**-k for k in range(2, 9))
 
 
-def main() -> None:
-    """Judge, print and write results/choices.json."""
-    rows = [
-        row
-        for name in problems.NAMES
-        for problem in problems.load(name)
-        for row in judge(problem, _points(name, problem))
-    ]
+def main(arguments: Sequence[str]) -> None:
+    """Judge, print and write results/choices.json; that of some problems is put among what is there of the others."""
+    names = [name for name in problems.NAMES if name in arguments] or list(problems.NAMES)
+    # Errors count here, not times: the problems share all cores.
+    rows = []
+    with ProcessPoolExecutor(mp_context=get_context("spawn")) as pool:
+        for name, found in zip(names, pool.map(judge_all, names), strict=True):
+            print(f"{name}: {len(found)} choices", flush=True)
+            rows += found
+    if len(names) < len(problems.NAMES):
+        judged = {row["problem"] for row in rows}
+        kept = json.loads(RESULTS.read_text())["choices"]
+        rows = [row for row in kept if row["problem"] not in judged] + rows
     record.write("choices", {"choices": rows}, directory=record.RESULTS)
     table = Table("problem", "tolerance", "choice", "error", "cost over the best", "the best")
     for row in rows:
@@ -56,6 +65,13 @@ def main() -> None:
         f"over the best: median {np.median(ratios):.2f}, largest {max(ratios):.2f}, above 1.2 in "
         f"{sum(ratio > 1.2 for ratio in ratios)}; {missed} refused that a method reaches"
     )
+
+
+def judge_all(name: str) -> list[dict[str, Any]]:
+    """The choices for all variants of a problem."""
+    return [
+        row for problem in problems.load(name) for row in judge(problem, _points(name, problem))
+    ]
 
 
 def judge(problem: Problem, points: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
@@ -152,4 +168,4 @@ def _points(name: str, problem: Problem) -> list[dict[str, Any]]:
 
 
 if __name__ == "__main__":
-    main()
+    main(sys.argv[1:])

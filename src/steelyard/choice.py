@@ -98,6 +98,8 @@ _MOST = 400_000
 #: Share of the tolerance that the reference may err by, and that is aimed at and accepted of the rest.
 _REFERENCE, _AIM, _ACCEPT = 0.05, 0.8, 0.95
 _TRIES = 12
+#: Most by which the number of steps grows from one try to the next.
+_FARTHEST = 64.0
 #: Height [m] whose energy is the least that errors of energy are held against.
 _LIFT = 1.0
 #: Where errors do not fall smoothly, as after impacts, one step may hold by luck: these many more must hold too.
@@ -343,14 +345,15 @@ def _smallest(
         if len(finite) > 1:
             (k0, e0), (k1, e1) = finite[-2:]
             order = min(max(math.log(e0 / e1) / math.log(k1 / k0), 0.5), order)
-        factor = 4.0 if error == math.inf else (error / (_AIM * tolerance)) ** (1.0 / order)
+        growth = math.log(max(error, 1e-300) / (_AIM * tolerance)) / order
+        factor = 4.0 if error == math.inf else math.exp(min(growth, math.log(_FARTHEST)))
         wanted = math.ceil(factor * steps)
         if high:
             wanted = min(max(wanted, low + 1), high)
             if wanted > 0.95 * high:
                 break
         else:
-            wanted = min(max(wanted, low + 1), 64 * steps)
+            wanted = max(wanted, low + 1)
         if wanted * _LOOKS > _MOST:
             break
         steps = wanted

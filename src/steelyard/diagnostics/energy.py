@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from ..scene.forces import (
     StiffSpring,
     UserForce,
 )
+from .spans import spans, values
 
 if TYPE_CHECKING:
     from ..world import World
@@ -34,35 +35,32 @@ def potential_energy(world: World) -> np.ndarray:
     """
     particles = world.particles
     height = (particles.acceleration * particles.position).sum(axis=2)
-    total = -(particles.mass_or_zero * height).sum(axis=1)
-    for force in world.scene.things:
-        if isinstance(force, Spring | AnchoredSpring | StiffSpring):
-            total = total + _spring(world, force)
-        elif isinstance(force, Buoyancy):
+    total = _springs(world) - (particles.mass_or_zero * height).sum(axis=1)
+    for force in world.scene.of(Buoyancy, Gravity, UserForce):
+        if isinstance(force, Buoyancy):
             total = total + _buoyancy(world, force)
         elif isinstance(force, Gravity):
             chosen = world.scene.particles if force.particles is None else force.particles
             for p in map(world._index, chosen):
                 along = (world[force].acceleration * particles.position[:, p]).sum(axis=-1)
                 total = total - particles.mass_or_zero[:, p] * along
-        elif isinstance(force, UserForce):
+        else:
             total = total + force.potential(particles.position)
     return total
 
 
-def _spring(world: World, force: Any) -> np.ndarray:
-    """k (l - l0)^2 / 2; for a bungee only where it is stretched."""
-    position = world.particles.position
-    handle = world[force]
-    if isinstance(force, Spring):
-        apart = position[:, world._index(force.a)] - position[:, world._index(force.b)]
-    else:
-        apart = position[:, world._index(force.particle)] - handle.anchor
-    rest = 0.0 if isinstance(force, StiffSpring) else handle.rest_length
-    stretch = np.linalg.norm(apart, axis=1) - rest
-    if isinstance(force, Bungee | AnchoredBungee):
-        stretch = np.maximum(stretch, 0.0)
-    return 0.5 * handle.stiffness * stretch**2
+def _springs(world: World) -> np.ndarray:
+    """k (l - l0)^2 / 2 of all springs; of a bungee only where it is stretched."""
+    springs = world.scene.of(Spring, Bungee, AnchoredSpring, AnchoredBungee, StiffSpring)
+    if not springs:
+        return np.zeros(world.worlds)
+    stretch = np.linalg.norm(spans(world, springs), axis=2)
+    resting = [k for k, force in enumerate(springs) if not isinstance(force, StiffSpring)]
+    if resting:
+        stretch[:, resting] -= values(world, [springs[k] for k in resting], "rest_length")
+    bungees = [k for k, force in enumerate(springs) if isinstance(force, Bungee | AnchoredBungee)]
+    stretch[:, bungees] = np.maximum(stretch[:, bungees], 0.0)
+    return np.asarray((0.5 * values(world, springs, "stiffness") * stretch**2).sum(axis=1))
 
 
 def _buoyancy(world: World, force: Buoyancy) -> np.ndarray:
