@@ -13,12 +13,27 @@ from .parameters import PARTICLES, Key
 if TYPE_CHECKING:
     from .compile import Compiler
 
+# Coefficients of a particle.
+_ROWS = 24
+
 
 def add_propagators(c: Compiler) -> None:
     """Per particle the rows of its coefficients and of the centre of its anchored springs."""
     records: list[int] = []
+    free = [p for p in range(len(c.particles)) if not c.linear.get(p)]
+
+    def damped(damping: np.ndarray) -> np.ndarray:
+        rate = derived.rate(damping[free])
+        weights = exponential_weights(np.zeros_like(rate), rate, c.method.substep)
+        return np.swapaxes(weights, 0, 1).reshape(-1, *rate.shape[1:])
+
+    first = c.slot(_ROWS * len(free), ((PARTICLES, "damping"),), damped)
+    alone = {p: first + _ROWS * k for k, p in enumerate(free)}
     for p in range(len(c.particles)):
-        linear = c.linear.get(p, [])
+        if p in alone:
+            records += [alone[p], c.zero]
+            continue
+        linear = c.linear[p]
         springs = [thing for thing, _, anchored in linear if anchored]
         stiffness: list[Key] = [(thing, "stiffness") for thing in springs]
         drags: list[Key] = [(thing, name) for thing, name, _ in linear if name is not None]
@@ -41,7 +56,7 @@ def add_propagators(c: Compiler) -> None:
         if springs:
             anchors: list[Key] = [(thing, "anchor") for thing in springs]
             centre = c.slot(3, (*stiffness, *anchors), _mean_anchor)
-        records += [c.slot(24, keys, coefficients), centre]
+        records += [c.slot(_ROWS, keys, coefficients), centre]
     c.sections["propagators"] = records
 
 
