@@ -74,7 +74,7 @@ def heavy_chain(ratio: float, *, links: int = LINKS) -> ParticleScene:
     mass[-1] = ratio
     return ParticleScene(
         position=position,
-        velocity=np.zeros((LINKS, 3)),
+        velocity=np.zeros((links, 3)),
         mass=mass,
         rods=tuple((k, k + 1, 1.0) for k in range(links - 1)),
         pins=((0, (0.0, 0.0, 0.0), 1.0),),

@@ -98,10 +98,12 @@ _MOST = 400_000
 #: Share of the tolerance that the reference may err by, and that is aimed at and accepted of the rest.
 _REFERENCE, _AIM, _ACCEPT = 0.05, 0.8, 0.95
 _TRIES = 12
+#: Error from which on a run has blown up.
+_LOST = 1e3
 #: Most by which the number of steps grows from one try to the next.
 _FARTHEST = 64.0
-#: Height [m] whose energy is the least that errors of energy are held against.
-_LIFT = 1.0
+#: Height [m] whose energy is the least that errors of energy are held against: what rests has no other.
+_LIFT = 1e-3
 #: Where errors do not fall smoothly, as after impacts, one step may hold by luck: these many more must hold too.
 _NEIGHBOURS = (1.07, 1.19, 1.37)
 
@@ -172,7 +174,7 @@ class _Track:
     """One run, at the looks that count: positions (looks, particles, 3), energies (looks,), worst residual of a link.
 
     ``scale`` is what errors of the energy are a share of: the most kinetic energy, the range of the energy, or what
-    lifts all particles by a metre, since an error of places allows as much.
+    lifts all particles by a millimetre.
     """
 
     position: np.ndarray
@@ -290,7 +292,8 @@ def _reference(runs: list[_Runs], start: int, tolerance: float) -> tuple[_Track 
     """
     trusted = [run for run in runs if run.exact] or runs
     best: tuple[_Track | None, float] = (None, math.inf)
-    for run in sorted(trusted, key=lambda run: -run.order):
+    # Of one order, those that resolve impacts first.
+    for run in sorted(trusted, key=lambda run: (-run.order, not run.candidate.integrator.splits)):
         steps, change = start, math.inf
         before = run.track(steps)
         while (finer := run.track(2 * steps)) is not None or 2 * steps * _LOOKS <= _MOST:
@@ -300,12 +303,18 @@ def _reference(runs: list[_Runs], start: int, tolerance: float) -> tuple[_Track 
                 # What is left of a method of first order, and more than that of others.
                 if change < best[1]:
                     best = finer, change
-                if change <= _REFERENCE * tolerance:
+                if change <= _REFERENCE * tolerance and _confirmed(run, steps, finer, tolerance):
                     return best
                 if change > 0.9 * last:
                     break
             before = finer
     return best
+
+
+def _confirmed(run: _Runs, steps: int, track: _Track, tolerance: float) -> bool:
+    """Whether a step between the last two gives the same: impacts may fall alike in a step and in its half."""
+    between = run.track(math.ceil(0.7 * steps))
+    return between is not None and between.distance(track) <= 2.0 * _REFERENCE * tolerance
 
 
 def _smallest(
@@ -326,7 +335,8 @@ def _smallest(
 
         def error_at(count: int) -> float:
             track = run.track(count)
-            return math.inf if track is None else track.distance(reference) + known
+            found = math.inf if track is None else track.distance(reference) + known
+            return found if found < _LOST else math.inf
 
         error = error_at(steps)
         tried[steps] = error
@@ -349,7 +359,11 @@ def _smallest(
         factor = 4.0 if error == math.inf else math.exp(min(growth, math.log(_FARTHEST)))
         wanted = math.ceil(factor * steps)
         if high:
-            wanted = min(max(wanted, low + 1), high)
+            # What breaks below a step says nothing of how far below: the middle of what is left is next.
+            broken = tried.get(low, 0.0) == math.inf
+            middle = math.ceil(math.sqrt(max(low, 1) * high))
+            wanted = middle if error == math.inf else max(wanted, middle if broken else low + 1)
+            wanted = min(wanted, high)
             if wanted > 0.95 * high:
                 break
         else:
@@ -372,7 +386,7 @@ def choose_method(
     Args:
         scene: what is to be stepped.
         tolerance: largest error [m] of a particle's place, and largest share of error of the energy (beside the largest
-            of the kinetic energy, the range of the energy, and what lifts all by a metre) and of a link's length.
+            of the kinetic energy, the range of the energy, and what lifts all by a millimetre) and of a link's length.
         horizon: how long the tolerance must hold [s].
         since: from when on errors count [s], within the horizon; for scenes that come to rest, of which only
             the rest matters.

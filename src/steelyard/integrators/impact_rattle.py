@@ -26,14 +26,16 @@ from ..collision.geometry import contact_geometry
 from ..constraints.contacts import contact_shift, contact_speed
 from ..constraints.controls import move_controls
 from ..constraints.links import link_half_square, link_rate
+from ..constraints.riders import DECK, HEAD
 from ..kernel import inner
 from ..math.lanes import absolute, any_lane, fma, load, select, splat, store
-from ..math.pointers import LANES
+from ..math.pointers import LANES, axes
 from ..model.tape import (
     CONTACT,
     EVENT,
     FRESH,
     H_BLOCKS,
+    H_CABLES,
     H_CONTACTS,
     H_DAMPED,
     H_DAMPING,
@@ -45,6 +47,7 @@ from ..model.tape import (
     H_LINKS,
     H_PARTICLES,
     H_PARTS,
+    H_RIDERS,
     H_STATE_ROWS,
     H_TRIAL,
     LINK,
@@ -278,29 +281,13 @@ def _note_impacts(tape, s, meets, near):
 
 @inner
 def _forget_impacts(tape, s):
-    """What has rebounded carries nothing; notes are cleared."""
+    """Clear the notes."""
     zero = splat(0.0)
     event = tape[H_EVENTS]
-    at = tape[H_CONTACTS]
-    for index in range(tape[at]):
-        contact = at + 1 + CONTACT * index
-        leaves = load(s, event + _LEAVES) > zero
-        for axis in range(3):
-            row = tape[contact + 15] + axis
-            store(s, row, select(leaves, zero, load(s, row)))
+    for _ in range(tape[tape[H_CONTACTS]] + tape[H_CABLES]):
         store(s, event + _CLOSES, zero)
         store(s, event + _LEAVES, zero)
         event += EVENT
-    at = tape[H_LINKS]
-    for index in range(tape[at]):
-        link = at + 1 + LINK * index
-        if tape[link + 10] != 0:
-            row = tape[link + 12]
-            leaves = load(s, event + _LEAVES) > zero
-            store(s, row, select(leaves, zero, load(s, row)))
-            store(s, event + _CLOSES, zero)
-            store(s, event + _LEAVES, zero)
-            event += EVENT
 
 
 @inner
@@ -315,9 +302,33 @@ def _set_length(tape, s, length):
 
 
 @inner
-def _run(tape, s, skip, length):
-    """One step of RATTLE over ``length``; contact gaps at its end."""
+def _scale_multipliers(tape, s, factor):
+    """Multipliers of links, riders and contacts times a factor."""
+    at = tape[H_LINKS]
+    for index in range(tape[at]):
+        row = tape[at + 1 + LINK * index + 12]
+        store(s, row, factor * load(s, row))
+    at = tape[H_RIDERS] + 1
+    for _ in range(tape[tape[H_RIDERS]]):
+        for axis in range(axes(s)):
+            row = tape[at + 3] + axis
+            store(s, row, factor * load(s, row))
+        at += HEAD + DECK * tape[at + 6]
+    at = tape[H_CONTACTS]
+    for index in range(tape[at]):
+        for axis in range(3):
+            row = tape[at + 1 + CONTACT * index + 15] + axis
+            store(s, row, factor * load(s, row))
+
+
+@inner
+def _run(tape, s, skip, length, share):
+    """One step of RATTLE over ``length``, ``share`` of the whole; contact gaps at its end.
+
+    Multipliers are those of a whole step between parts; they grow with the square of its length.
+    """
     _set_length(tape, s, length)
+    _scale_multipliers(tape, s, share * share)
     skip[tape[H_BLOCKS] + FRESH] = 1
     at = tape[H_PARTS]
     for index in range(tape[at]):
@@ -349,7 +360,9 @@ def impact_rattle_step(tape, s, skip, part):
         trial = one if turn < tape[H_IMPACTS] else zero
         store(s, tape[H_TRIAL], trial)
         length = left
-        _run(tape, s, skip, length)
+        share = length / dt
+        _run(tape, s, skip, length, share)
+        back = one / (share * share)
         if turn < tape[H_IMPACTS]:
             time = _when(tape, s, True, length, left, active)
             meets = active & (time < left)
@@ -357,7 +370,7 @@ def impact_rattle_step(tape, s, skip, part):
                 length = select(time > shortest, time, shortest)
                 for _ in range(1, _TRIALS):
                     _put_back(tape, s, zero <= zero)
-                    _run(tape, s, skip, length)
+                    _run(tape, s, skip, length, length / dt)
                     time = _when(tape, s, False, length, left, active)
                     # A part that is as short as may be stays so.
                     change = select(meets, time - length, zero)
@@ -369,8 +382,11 @@ def impact_rattle_step(tape, s, skip, part):
                 length = select(meets, length + splat(_PAST) * dt, length)
                 store(s, tape[H_TRIAL], select(meets, zero, one))
                 _put_back(tape, s, zero <= zero)
-                _run(tape, s, skip, length)
+                _run(tape, s, skip, length, length / dt)
                 _forget_impacts(tape, s)
+                # An impact lasts no time: what it does to places says nothing of loads, and those before it are gone.
+                back = select(meets, zero, back)
+        _scale_multipliers(tape, s, back)
         done = select(active, zero, one) > half
         _put_back(tape, s, done)
         left = select(active, left - length, dt)
