@@ -51,7 +51,8 @@ def sum_springs(tape, s):  # type: ignore[no-untyped-def]
 def sprung_first_half(tape, s, skip, part):  # type: ignore[no-untyped-def]
     """Springs, kick and drift."""
     dt = ext.load(s, tape[H_DT])
-    sum_springs(tape, s)
+    if skip[tape[ext.tape.H_BLOCKS] + ext.tape.FRESH] != 0:
+        sum_springs(tape, s)
     ext.damp(tape, s)
     ext.kick(tape, s, ext.splat(0.5) * dt)
     ext.drift(tape, s, dt)

@@ -19,7 +19,7 @@ from ..forces.accumulate import acting_forces
 from ..forces.drag import flow_drag
 from ..forces.stiff_spring import flow_stiff_springs
 from ..math.lanes import load, splat
-from ..model.tape import H_DT
+from ..model.tape import FRESH, H_BLOCKS, H_DT
 from ..solvers.base import Solver
 from ..solvers.stages import begin_step
 from ..stage import Stage, stage
@@ -68,7 +68,8 @@ def rattle_halves(acting: Acting) -> tuple[Stage, Stage]:
     def rattle_first_half(tape, s, skip, half):
         """The position stage follows."""
         dt = load(s, tape[H_DT])
-        if summed:
+        # Forces of place alone are those that the step before ended with.
+        if summed and skip[tape[H_BLOCKS] + FRESH] != 0:
             accumulate(tape, s)
         damp(tape, s)
         if drags:
