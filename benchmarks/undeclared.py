@@ -19,7 +19,9 @@ from benchmarks.figures import Announce, Figure
 
 ext = sy.extension
 STAGES = ("flight", "springs")
-WORLDS, STEPS, PAIRS = 1024, 200, 41
+WORLDS, STEPS, PAIRS = 1024, 100, 15
+#: Where arrays lie in memory makes steps as short as these differ by a quarter: the median is over worlds built anew.
+BUILDS = 15
 H_DT, H_FORCE, H_PARTICLES = ext.tape.H_DT, ext.tape.H_FORCE, ext.tape.H_PARTICLES
 
 
@@ -106,28 +108,37 @@ def springs() -> sy.Scene:
     return scene
 
 
+def compare(name: str, scene: sy.Scene, bare: sy.Integrator, *, quick: bool) -> float:
+    """CPU time of a step over that of the bare method, in worlds built anew.
+
+    Raises:
+        ArithmeticError: they do not step alike.
+    """
+    worlds, steps = (16, 2) if quick else (WORLDS, STEPS)
+    whole = sy.World(scene, worlds=worlds, method=sy.Method(sy.Rattle()))
+    alone = sy.World(scene, worlds=worlds, method=sy.Method(bare))
+    for _ in range(3):
+        whole.step(2)
+        alone.step(2)
+    if not np.array_equal(whole.particles.position, alone.particles.position):
+        raise ArithmeticError(f"{name}: the bare method is not the same method")
+    times = record.interleave(
+        {"whole": partial(whole.step, steps), "bare": partial(alone.step, steps)},
+        repeats=1 if quick else PAIRS,
+    )
+    return times["whole"] / times["bare"]
+
+
 def run(*, quick: bool, output: Path, announce: Announce) -> list[Figure]:
     """Measure and write undeclared.json to `output`."""
     figures = []
     for name, scene, bare in (("flight", flight(), Bare()), ("springs", springs(), Sprung())):
         announce(name)
-        worlds = 16 if quick else WORLDS
-        whole = sy.World(scene, worlds=worlds, method=sy.Method(sy.Rattle()))
-        alone = sy.World(scene, worlds=worlds, method=sy.Method(bare))
-        for _ in range(3):
-            whole.step(2)
-            alone.step(2)
-        if not np.array_equal(whole.particles.position, alone.particles.position):
-            raise ArithmeticError(f"{name}: the bare method is not the same method")
-        steps = 2 if quick else STEPS
-        times = record.interleave(
-            {"whole": partial(whole.step, steps), "bare": partial(alone.step, steps)},
-            repeats=1 if quick else PAIRS,
-        )
+        ratios = [compare(name, scene, bare, quick=quick) for _ in range(1 if quick else BUILDS)]
         figures.append(
             Figure(
                 name=f"{name}: a step over one without the kernels it does not use",
-                measured=times["whole"] / times["bare"],
+                measured=float(np.median(ratios)),
                 at_most=1.02,
             )
         )

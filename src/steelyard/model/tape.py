@@ -124,8 +124,8 @@ CLUSTER_HEAD, ENTRY, LOAD_HEAD = 11, 4, 5
 INERTIA, INVERSE, TURN, SHIFT, CENTRE, DELTA, BASE, MEAN, ARMS = 0, 6, 12, 15, 18, 21, 24, 30, 33
 ARM, BEFORE, AFTER, MOTION, LOAD_ROWS = 0, 3, 6, 9, 12
 
-# Words behind the flags of blocks in ``skip``, from H_BLOCKS on: whether the factor and the forces at hand are not of the
-# step's start, and whether worlds in which a contact slips or opens are to be given up.
+# Words behind the flags of blocks in ``skip``, from H_BLOCKS on: whether the factor and the forces at hand are not of
+# the step's start, and whether worlds in which a contact slips or opens are to be given up.
 FRESH, HASTY, WORDS = range(3)
 
 # Codes of contact geometries.
