@@ -3,8 +3,9 @@
     python -m benchmarks.laboratory.costs
 
 Reads what ``make charts`` measured and writes src/steelyard/costs.json. Kernels work through the index tape, so the
-cost of a step is fitted by a constant, a part per particle and a part per word on the tape, none negative, with
-relative errors. Scenes whose contacts are written in Python are left out: the calls cost more than the steps.
+cost of a step is fitted by a constant, a part per particle, one per word on the tape and one per spring or drag, none
+negative, with relative errors. Scenes whose contacts are written in Python are left out: the calls cost more than the
+steps.
 """
 
 from __future__ import annotations
@@ -18,14 +19,15 @@ from scipy.optimize import nnls
 import steelyard as sy
 from benchmarks import record
 from benchmarks.laboratory import methods, problems
+from steelyard.choice import work
 
 CHARTS = record.RESULTS / "charts"
 TABLE = record.ROOT / "src" / "steelyard" / "costs.json"
 
 
-def measured() -> dict[str, list[tuple[float, float, float]]]:
-    """By method: particles, words on the tape and cost of a step [us], a row per problem."""
-    rows: dict[str, list[tuple[float, float, float]]] = {}
+def measured() -> dict[str, list[tuple[float, ...]]]:
+    """By method: what ``steelyard.choice.work`` counts, then the cost of a step [us]; a row per problem."""
+    rows: dict[str, list[tuple[float, ...]]] = {}
     for name in problems.NAMES:
         found = json.loads((CHARTS / f"{name}.json").read_text())["variants"]
         for problem in problems.load(name):
@@ -43,15 +45,15 @@ def measured() -> dict[str, list[tuple[float, float, float]]]:
                 if costs:
                     world = sy.World(scene, method=candidate.at(problem.stretch / 8.0))
                     rows.setdefault(candidate.name, []).append(
-                        (len(scene.particles), world.model.words, float(np.median(costs)))
+                        (*work(scene, world.model.words), float(np.median(costs)))
                     )
     return rows
 
 
-def fit(rows: list[tuple[float, float, float]]) -> tuple[list[float], float]:
-    """Coefficients of a constant, particles and words [us]; root mean square of the relative error."""
+def fit(rows: list[tuple[float, ...]]) -> tuple[list[float], float]:
+    """Cost of each kind of work [us]; root mean square of the relative error."""
     data = np.array(rows)
-    features = np.column_stack([np.ones(len(data)), data[:, :2]]) / data[:, 2:]
+    features = data[:, :-1] / data[:, -1:]
     coefficients, distance = nnls(features, np.ones(len(data)))
     return coefficients.tolist(), float(distance) / math.sqrt(len(data))
 
@@ -62,7 +64,7 @@ def main() -> None:
     fits = {name: fit(rows[name]) for name in sorted(rows)}
     payload = {
         "source": "python -m benchmarks.laboratory.costs, from benchmarks/results/charts",
-        "units": "us per step and world: constant, per particle, per word on the tape",
+        "units": "us per step and world: constant, per particle, per word on the tape, per spring or drag",
         "coefficients": {name: coefficients for name, (coefficients, _) in fits.items()},
         "relative_error": {name: error for name, (_, error) in fits.items()},
     }
