@@ -19,14 +19,13 @@ from scipy.optimize import nnls
 import steelyard as sy
 from benchmarks import record
 from benchmarks.laboratory import methods, problems
-from steelyard.choice import work
 
 CHARTS = record.RESULTS / "charts"
 TABLE = record.ROOT / "src" / "steelyard" / "costs.json"
 
 
 def measured() -> dict[str, list[tuple[float, ...]]]:
-    """By method: what ``steelyard.choice.work`` counts, then the cost of a step [us]; a row per problem."""
+    """By method: what ``Candidate.work`` counts, then the cost of a step [us]; a row per problem."""
     rows: dict[str, list[tuple[float, ...]]] = {}
     for name in problems.NAMES:
         found = json.loads((CHARTS / f"{name}.json").read_text())["variants"]
@@ -45,7 +44,7 @@ def measured() -> dict[str, list[tuple[float, ...]]]:
                 if costs:
                     world = sy.World(scene, method=candidate.at(problem.stretch / 8.0))
                     rows.setdefault(candidate.name, []).append(
-                        (*work(scene, world.model.words), float(np.median(costs)))
+                        (*candidate.work(scene, world.model.words), float(np.median(costs)))
                     )
     return rows
 
