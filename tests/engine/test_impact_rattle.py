@@ -10,6 +10,7 @@ import pytest
 from scipy.optimize import brentq
 
 import steelyard as sy
+from tests.engine.test_batch import falling_platform
 
 G = 9.81
 DT = 1.0 / 60.0
@@ -209,3 +210,23 @@ def test_what_cannot_be_divided_is_refused() -> None:
         other.add(thing)
         with pytest.raises(ValueError, match=f"cannot step a {type(thing).__name__}"):
             sy.World(other, method=method())
+
+
+def test_second_order_as_a_frame_of_rods_lands_on_its_feet() -> None:
+    places = {}
+    for integrator in (sy.Rattle(), sy.ImpactRattle()):
+        for rate in (60, 120, 240, 1920):
+            world = sy.World(
+                falling_platform(), method=sy.Method(integrator, sy.Direct(), dt=1.0 / rate)
+            )
+            world.step(round(0.8 * rate))
+            assert world.health[0] == 0
+            places[type(integrator), rate] = world.particles.position[0].copy()
+    true = places[sy.ImpactRattle, 1920]
+    error = {key: float(np.abs(place - true).max()) for key, place in places.items()}
+    assert error[sy.ImpactRattle, 60] < 2e-3
+    assert error[sy.ImpactRattle, 60] / error[sy.ImpactRattle, 120] > 3.5
+    assert error[sy.ImpactRattle, 120] / error[sy.ImpactRattle, 240] > 3.5
+    # The same motion, of first order.
+    assert error[sy.Rattle, 60] > 5.0 * error[sy.ImpactRattle, 60]
+    assert 4.0 < error[sy.Rattle, 60] / error[sy.Rattle, 1920] < 64.0
