@@ -20,7 +20,6 @@ from .math.pointers import (
     axes,
     doubles_at,
     integers_at,
-    prefetch,
     tape_at,
 )
 from .model.tape import (
@@ -176,10 +175,6 @@ def _advance_blocks(launch, s, first, last, substeps, phase):
                 picked[k] = LANES * block + min(k, count - 1)
             block += 1
         _load_block(tape, s, state, given, given_rows, launch[L_GIVEN_COUNT], width, picked, whole)
-        if whole and block < last:
-            # The rows of a block lie pages apart, which no hardware foresees.
-            for row in range(tape[H_STATE_ROWS]):
-                prefetch(state, width * row + LANES * block)
         store(s, tape[H_GIVEN_UP], splat(0.0))
         skip[words + HASTY] = 1 if hasty else 0
         for substep in range(substeps):

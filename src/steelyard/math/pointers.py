@@ -15,7 +15,6 @@ from typing import Any
 
 from llvmlite import ir
 from numba import types
-from numba.core import cgutils
 from numba.core.extending import intrinsic, lower_builtin, models, register_model
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 
@@ -140,22 +139,7 @@ def _spatial(typing_context: Any, rows: Any) -> Any:
     return Doubles(rows), lambda context, builder, sig, args: args[0]
 
 
-def _prefetch(typing_context: Any, pointer: Any, entry: Any) -> Any:
-    """Ask for the cache line of an entry, which will be read and written."""
-
-    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        flag = ir.IntType(32)
-        address = builder.bitcast(builder.gep(args[0], [args[1]]), ir.IntType(8).as_pointer())
-        kind = ir.FunctionType(ir.VoidType(), [address.type, flag, flag, flag])
-        function = cgutils.get_or_insert_function(builder.module, kind, "llvm.prefetch.p0i8")
-        builder.call(function, [address, flag(1), flag(3), flag(1)])
-        return context.get_dummy_value()
-
-    return types.void(pointer, types.int64), codegen
-
-
 axes: Any = intrinsic(_axes)
-prefetch: Any = intrinsic(_prefetch)
 spatial: Any = intrinsic(_spatial)
 
 
