@@ -10,18 +10,14 @@ from __future__ import annotations
 from ..kernel import inner
 from ..math.lanes import fma, load, select, splat, sqrt, store
 from ..math.pointers import axes
-from ..math.vectors import dot, load_coordinates
+from ..math.vectors import between, dot, load_coordinates
 from ..model.tape import H_LINKS, LINK
 
 
 @inner
 def link_half_square(s, link, tape, length):
     """(d.d - L^2)/2 at the current positions."""
-    ax, ay, az = load_coordinates(s, tape[link])
-    bx, by, bz = load_coordinates(s, tape[link + 1])
-    x = ax - bx
-    y = ay - by
-    z = az - bz
+    x, y, z = between(s, tape[link], tape[link + 1])
     square = dot(x, y, z, x, y, z)
     return splat(0.5) * fma(splat(0.0) - length, length, square)
 
@@ -29,10 +25,9 @@ def link_half_square(s, link, tape, length):
 @inner
 def link_rate(s, link, tape):
     """d . (v_a - v_b) with the stored gradient d."""
-    ax, ay, az = load_coordinates(s, tape[link + 2])
-    bx, by, bz = load_coordinates(s, tape[link + 3])
     x, y, z = load_coordinates(s, tape[link + 13])
-    return dot(x, y, z, ax - bx, ay - by, az - bz)
+    u, v, w = between(s, tape[link + 2], tape[link + 3])
+    return dot(x, y, z, u, v, w)
 
 
 @inner

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from ..kernel import inner
 from ..math.lanes import fma, load, splat, sqrt
-from ..math.vectors import add_scaled, dot, load_coordinates, store_coordinates
+from ..math.vectors import add_scaled, between, dot, load_coordinates, store_coordinates
 from ..model.tape import H_DRAGS
 
 RECORD = 7
@@ -21,11 +21,7 @@ RECORD = 7
 @inner
 def _through_air(tape, s, k):
     """Velocity relative to the wind, and its size."""
-    vx, vy, vz = load_coordinates(s, tape[k])
-    wx, wy, wz = load_coordinates(s, tape[k + 4])
-    x = vx - wx
-    y = vy - wy
-    z = vz - wz
+    x, y, z = between(s, tape[k], tape[k + 4])
     return x, y, z, sqrt(dot(x, y, z, x, y, z))
 
 

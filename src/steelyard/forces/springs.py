@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from ..kernel import inner
 from ..math.lanes import load, select, splat, sqrt
-from ..math.vectors import add_scaled, dot, load_coordinates
+from ..math.vectors import add_scaled, between, dot
 from ..model.tape import H_SPRINGS
 
 RECORD = 7
@@ -23,11 +23,7 @@ def add_springs(tape, s):
     at = tape[H_SPRINGS]
     for index in range(tape[at]):
         k = at + 1 + RECORD * index
-        ax, ay, az = load_coordinates(s, tape[k])
-        bx, by, bz = load_coordinates(s, tape[k + 1])
-        x = ax - bx
-        y = ay - by
-        z = az - bz
+        x, y, z = between(s, tape[k], tape[k + 1])
         length = sqrt(dot(x, y, z, x, y, z))
         stretch = length - load(s, tape[k + 5])
         if tape[k + 6] == ONE_SIDED:

@@ -26,23 +26,19 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from ..constraints.controls import move_controls
-from ..constraints.riders import DECK, HEAD
 from ..math.lanes import load, store
-from ..math.pointers import axes
 from ..model.tape import (
     FRESH,
     H_BLOCKS,
     H_DAMPED,
     H_DAMPING,
     H_DT,
-    H_LINKS,
     H_PARTICLES,
-    H_RIDERS,
     H_SUBSTEPS,
-    LINK,
 )
 from ..scene import checks
 from ..solvers.base import Solver
+from ..solvers.gather import scale_multipliers
 from ..solvers.stages import begin_step
 from ..stage import stage
 from .base import Acting, Integrator, Recipe
@@ -136,17 +132,7 @@ def begin_substep(tape, s, skip, part):
     if tape[H_DAMPED] != 0:
         for p in range(tape[H_PARTICLES]):
             store(s, tape[H_DAMPING] + p, load(s, tape[record + 1] + p))
-    grown = load(s, tape[record + 2])
-    at = tape[H_LINKS]
-    for index in range(tape[at]):
-        row = tape[at + 1 + LINK * index + 12]
-        store(s, row, grown * load(s, row))
-    at = tape[H_RIDERS] + 1
-    for _ in range(tape[tape[H_RIDERS]]):
-        for axis in range(axes(s)):
-            row = tape[at + 3] + axis
-            store(s, row, grown * load(s, row))
-        at += HEAD + DECK * tape[at + 6]
+    scale_multipliers(tape, s, load(s, tape[record + 2]))
     if part > _HALVES:
         # The factor at hand is that of the substep before, where this one begins.
         skip[tape[H_BLOCKS] + FRESH] = 0

@@ -26,10 +26,9 @@ from ..collision.geometry import contact_geometry
 from ..constraints.contacts import contact_shift, contact_speed
 from ..constraints.controls import move_controls
 from ..constraints.links import link_half_square, link_rate
-from ..constraints.riders import DECK, HEAD
 from ..kernel import inner
 from ..math.lanes import absolute, any_lane, fma, load, select, splat, store
-from ..math.pointers import LANES, axes
+from ..math.pointers import LANES
 from ..model.tape import (
     CONTACT,
     EVENT,
@@ -47,13 +46,13 @@ from ..model.tape import (
     H_LINKS,
     H_PARTICLES,
     H_PARTS,
-    H_RIDERS,
     H_STATE_ROWS,
     H_TRIAL,
     LINK,
 )
 from ..scene import checks
 from ..solvers.base import Solver
+from ..solvers.gather import scale_multipliers
 from ..solvers.stages import begin_step
 from ..stage import call_stage, stage
 from .base import Acting, Integrator, Recipe
@@ -302,33 +301,13 @@ def _set_length(tape, s, length):
 
 
 @inner
-def _scale_multipliers(tape, s, factor):
-    """Multipliers of links, riders and contacts times a factor."""
-    at = tape[H_LINKS]
-    for index in range(tape[at]):
-        row = tape[at + 1 + LINK * index + 12]
-        store(s, row, factor * load(s, row))
-    at = tape[H_RIDERS] + 1
-    for _ in range(tape[tape[H_RIDERS]]):
-        for axis in range(axes(s)):
-            row = tape[at + 3] + axis
-            store(s, row, factor * load(s, row))
-        at += HEAD + DECK * tape[at + 6]
-    at = tape[H_CONTACTS]
-    for index in range(tape[at]):
-        for axis in range(3):
-            row = tape[at + 1 + CONTACT * index + 15] + axis
-            store(s, row, factor * load(s, row))
-
-
-@inner
 def _run(tape, s, skip, length, share):
     """One step of RATTLE over ``length``, ``share`` of the whole; contact gaps at its end.
 
     Multipliers are those of a whole step between parts; they grow with the square of its length.
     """
     _set_length(tape, s, length)
-    _scale_multipliers(tape, s, share * share)
+    scale_multipliers(tape, s, share * share)
     skip[tape[H_BLOCKS] + FRESH] = 1
     at = tape[H_PARTS]
     for index in range(tape[at]):
@@ -386,7 +365,7 @@ def impact_rattle_step(tape, s, skip, part):
                 _forget_impacts(tape, s)
                 # An impact lasts no time: what it does to places says nothing of loads, and those before it are gone.
                 back = select(meets, zero, back)
-        _scale_multipliers(tape, s, back)
+        scale_multipliers(tape, s, back)
         done = select(active, zero, one) > half
         _put_back(tape, s, done)
         left = select(active, left - length, dt)

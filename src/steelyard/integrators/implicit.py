@@ -13,7 +13,7 @@ from ..forces import buoyancy, drag, springs
 from ..kernel import inner
 from ..math.lanes import any_lane, fma, load, select, splat, sqrt, store
 from ..math.pointers import axes
-from ..math.vectors import dot, load_coordinates
+from ..math.vectors import between, dot, load_coordinates
 from ..model.tape import (
     H_ACCELERATION,
     H_ACTIVE,
@@ -84,11 +84,7 @@ def add_spring_blocks(tape, s, reach):
     for index in range(tape[at]):
         k = at + 1 + springs.RECORD * index
         j = blocks + 1 + SPRING_BLOCK * index
-        ax, ay, az = load_coordinates(s, tape[k])
-        bx, by, bz = load_coordinates(s, tape[k + 1])
-        x = ax - bx
-        y = ay - by
-        z = az - bz
+        x, y, z = between(s, tape[k], tape[k + 1])
         square_length = dot(x, y, z, x, y, z)
         apart = square_length > zero
         inverse = one / sqrt(select(apart, square_length, one))
@@ -132,11 +128,7 @@ def add_drag_blocks(tape, s, reach):
     at = tape[H_DRAGS]
     for index in range(tape[at]):
         k = at + 1 + drag.RECORD * index
-        vx, vy, vz = load_coordinates(s, tape[k])
-        wx, wy, wz = load_coordinates(s, tape[k + 4])
-        x = vx - wx
-        y = vy - wy
-        z = vz - wz
+        x, y, z = between(s, tape[k], tape[k + 4])
         speed = sqrt(dot(x, y, z, x, y, z))
         moves = speed > zero
         quadratic = reach * load(s, tape[k + 3])

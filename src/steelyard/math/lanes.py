@@ -94,49 +94,43 @@ def _entry(builder: Any, row: Any) -> Any:
     return builder.mul(row, ir.Constant(ir.IntType(64), LANES))
 
 
+def _load(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    return builder.load(_row(builder, args[0], _entry(builder, args[1])), align=64)
+
+
+def _store(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    builder.store(args[2], _row(builder, args[0], _entry(builder, args[1])), align=64)
+    return context.get_dummy_value()
+
+
+def _nothing(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    return context.get_dummy_value()
+
+
 @_operation
 def load(typing_context: Any, rows: Any, row: Any) -> Any:
     """Lane vector in row ``row`` of the scratch (rows, LANES), which starts on a cache line."""
-
-    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        return builder.load(_row(builder, args[0], _entry(builder, args[1])), align=64)
-
-    return lane(rows, types.int64), codegen
+    return lane(rows, types.int64), _load
 
 
 @_operation
 def store(typing_context: Any, rows: Any, row: Any, value: Any) -> Any:
     """Write a lane vector to row ``row`` of the scratch."""
-
-    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        builder.store(args[2], _row(builder, args[0], _entry(builder, args[1])), align=64)
-        return context.get_dummy_value()
-
-    return types.void(rows, types.int64, lane), codegen
+    return types.void(rows, types.int64, lane), _store
 
 
 @_operation
 def load_z(typing_context: Any, rows: Any, row: Any) -> Any:
     """``load`` of a third coordinate: nil in a planar scene."""
     if rows.axes == 2:
-        return nil(rows, types.int64), lambda context, *_: context.get_dummy_value()
-
-    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        return builder.load(_row(builder, args[0], _entry(builder, args[1])), align=64)
-
-    return lane(rows, types.int64), codegen
+        return nil(rows, types.int64), _nothing
+    return lane(rows, types.int64), _load
 
 
 @_operation
 def store_z(typing_context: Any, rows: Any, row: Any, value: Any) -> Any:
     """``store`` of a third coordinate: nothing in a planar scene."""
-
-    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        if rows.axes == 3:
-            builder.store(args[2], _row(builder, args[0], _entry(builder, args[1])), align=64)
-        return context.get_dummy_value()
-
-    return types.void(rows, types.int64, lane), codegen
+    return types.void(rows, types.int64, lane), _nothing if rows.axes == 2 else _store
 
 
 @_operation
@@ -210,7 +204,7 @@ def absolute(typing_context: Any, a: Any) -> Any:
 def select(typing_context: Any, condition: Any, yes: Any, no: Any) -> Any:
     """``yes`` in the lanes where the condition holds, ``no`` in the others."""
     if (yes, no) == (nil, nil):
-        return nil(mask, nil, nil), lambda context, *_: context.get_dummy_value()
+        return nil(mask, nil, nil), _nothing
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         return builder.select(*args)

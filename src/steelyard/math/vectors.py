@@ -35,6 +35,14 @@ def store_coordinates(s, row, x, y, z):
 
 
 @inner
+def between(s, a, b):
+    """From b to a: position, velocity or wind."""
+    ax, ay, az = load_coordinates(s, a)
+    bx, by, bz = load_coordinates(s, b)
+    return ax - bx, ay - by, az - bz
+
+
+@inner
 def add_scaled(s, row, factor, x, y, z):
     """Position, velocity or force += factor times a vector."""
     store(s, row, fma(factor, x, load(s, row)))

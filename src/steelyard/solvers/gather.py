@@ -41,6 +41,26 @@ def clear_velocity_multipliers(tape, s):
 
 
 @inner
+def scale_multipliers(tape, s, factor):
+    """Multipliers of links, riders and contacts times a factor."""
+    at = tape[H_LINKS]
+    for index in range(tape[at]):
+        row = tape[at + 1 + LINK * index + 12]
+        store(s, row, factor * load(s, row))
+    at = tape[H_RIDERS] + 1
+    for _ in range(tape[tape[H_RIDERS]]):
+        for axis in range(axes(s)):
+            row = tape[at + 3] + axis
+            store(s, row, factor * load(s, row))
+        at += HEAD + DECK * tape[at + 6]
+    at = tape[H_CONTACTS]
+    for index in range(tape[at]):
+        for axis in range(3):
+            row = tape[at + 1 + CONTACT * index + 15] + axis
+            store(s, row, factor * load(s, row))
+
+
+@inner
 def gather(tape, s, skip, velocity, target):
     """Sum all impulses and apply them: rows ``target`` = free rows + M^-1 impulse.
 

@@ -12,7 +12,7 @@ from ..constraints.riders import DECK, HEAD, rider_offset, rider_slip
 from ..kernel import inner
 from ..math.lanes import absolute, fma, load, select, splat, store
 from ..math.pointers import axes
-from ..math.vectors import dot, load_coordinates
+from ..math.vectors import between, dot
 from ..model.tape import (
     H_IMPULSE,
     H_LINKS,
@@ -233,11 +233,7 @@ def acceleration_rows(tape, s):
     at = tape[H_LINKS]
     for index in range(tape[at]):
         link = at + 1 + LINK * index
-        ax, ay, az = load_coordinates(s, tape[link + 2])
-        bx, by, bz = load_coordinates(s, tape[link + 3])
-        x = ax - bx
-        y = ay - by
-        z = az - bz
+        x, y, z = between(s, tape[link + 2], tape[link + 3])
         square = dot(x, y, z, x, y, z)
         rate = load(s, tape[link + 9])
         wanted = fma(load(s, tape[link + 8]), load(s, tape[link + 16]), rate * rate) - square

@@ -31,7 +31,7 @@ from ..constraints.riders import DECK, HEAD, rider_impulses, rider_multiplier
 from ..kernel import inner
 from ..math.lanes import fma, load, select, splat, sqrt, store
 from ..math.pointers import axes
-from ..math.vectors import add_scaled, dot, load_coordinates, store_coordinates
+from ..math.vectors import add_scaled, between, dot, load_coordinates, store_coordinates
 from ..model.tape import (
     COMPLIANCE,
     CONTACT,
@@ -100,11 +100,7 @@ def _direction(s, a, b):
     """Unit vector from b to a, 0 where they coincide, and their distance."""
     zero = splat(0.0)
     one = splat(1.0)
-    ax, ay, az = load_coordinates(s, a)
-    bx, by, bz = load_coordinates(s, b)
-    x = ax - bx
-    y = ay - by
-    z = az - bz
+    x, y, z = between(s, a, b)
     distance = sqrt(dot(x, y, z, x, y, z))
     some = distance > zero
     inverse = select(some, one / select(some, distance, one), zero)
