@@ -59,15 +59,17 @@ class Scene:
     Args:
         gravity: acceleration [m/s^2] of every particle that does not bring its own.
         planar: all that it holds lies and moves in the plane z = 0, and kernels step two coordinates instead of three;
-            arrays keep the third, which stays 0 whatever is written to it.
+            arrays keep the third, which stepping neither reads nor changes: leave it 0, as the energy counts it.
 
     Raises:
+        TypeError: ``planar`` is no bool.
         ValueError: gravity is not finite, or a planar scene has some along z.
     """
 
     def __init__(self, *, gravity: checks.Vector = (0.0, -9.81, 0.0), planar: bool = False) -> None:
         self.gravity = checks.vector("Scene", "gravity", gravity)
-        self.planar = bool(planar)
+        checks.instance("Scene", "planar", planar, bool, remedy="Use True or False.")
+        self.planar = planar
         if self.planar:
             checks.in_plane("Scene", "gravity", np.array(self.gravity))
         self.things: list[Any] = []
