@@ -23,9 +23,11 @@ from benchmarks.laboratory.problems import (
     catenary,
     cloth,
     collision,
+    net,
     projectile,
 )
 from benchmarks.moving_load import taut_motion
+from benchmarks.spring_network import SpringNetwork
 
 Array = np.ndarray
 
@@ -243,6 +245,23 @@ def test_cloth_by_another_tolerance_and_by_small_steps_of_order_four() -> None:
         world.step(128)
         np.testing.assert_allclose(world.particles.position[0], place, rtol=0, atol=1e-8)
         np.testing.assert_allclose(world.particles.velocity[0], speed, rtol=0, atol=1e-5)
+
+
+def test_net_keeps_its_energy_and_is_met_by_order_four() -> None:
+    stored = net.stored()
+    network = SpringNetwork(net.net())
+    change = network.energy(stored.position, stored.velocity) - network.energy(
+        *network.start[:, None]
+    )
+    np.testing.assert_allclose(change, 0.0, rtol=0, atol=1e-10)
+    np.testing.assert_allclose(net.integrate().position, stored.position, rtol=0, atol=1e-11)
+    distance = []
+    for steps in (96, 192):
+        method = sy.Method(sy.KinkRungeKutta4(), dt=net.STRETCH / steps)
+        world = sy.World(net.net(), method=method)
+        world.step(steps * len(net.LOOKS))
+        distance.append(np.abs(world.particles.position[0] - stored.position[-1]).max())
+    assert distance[1] < 2e-6 and distance[0] / distance[1] > 10.0
 
 
 def test_projectile_without_drag_is_the_limit_of_little_drag() -> None:

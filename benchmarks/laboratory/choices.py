@@ -118,15 +118,32 @@ def judge(problem: Problem, points: Sequence[Mapping[str, Any]]) -> list[dict[st
 
 
 def score(problem: Problem, method: sy.Method) -> float:
-    """Worst error of a method, its step shortened to divide the problem's stretch."""
+    """Worst error of a method; inf where it breaks.
+
+    Looks that its step hits are of a run at that step, the others of one at the next shorter step that hits them all.
+    """
     dt = problem.stretch / math.ceil(problem.stretch / method.dt - 1e-9)
+    steps = math.ceil(problem.duration / method.dt - 1e-9)
     try:
-        run = EngineRun(
-            problem, problem.scene(), sy.Method(method.integrator, method.solver, dt=dt)
-        )
-        return worst(problem.errors(run.motion()))
+        motion = EngineRun(problem, problem.scene(), _stepping(method, dt)).motion()
+        world = sy.World(problem.scene(), method=_stepping(method, problem.duration / steps))
+        hits = math.gcd(steps, problem.looks[-1])
+        stretches = problem.looks[-1] // hits
+        for hit in range(1, hits + 1):
+            world.step(steps // hits)
+            if world.health[0]:
+                return math.inf
+            if stretches * hit in problem.looks:
+                look = problem.looks.index(stretches * hit)
+                motion.position[look] = world.particles.position[0]
+                motion.velocity[look] = world.particles.velocity[0]
     except BrokenRunError:
         return math.inf
+    return worst(problem.errors(motion))
+
+
+def _stepping(method: sy.Method, dt: float) -> sy.Method:
+    return sy.Method(method.integrator, method.solver, dt=dt)
 
 
 def step_cost(points: Sequence[Mapping[str, Any]], name: str) -> float | None:

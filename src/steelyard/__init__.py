@@ -10,6 +10,7 @@ from .integrators.exponential import ExponentialRungeKutta
 from .integrators.generalised_alpha import GeneralisedAlpha
 from .integrators.impact_rattle import ImpactRattle
 from .integrators.implicit_midpoint import ImplicitMidpoint
+from .integrators.kink_rk4 import KinkRungeKutta4
 from .integrators.linearly_implicit import LinearlyImplicit
 from .integrators.rattle import Rattle
 from .integrators.rk4 import RungeKutta4
@@ -67,6 +68,7 @@ __all__ = [
     "Ground",
     "ImpactRattle",
     "ImplicitMidpoint",
+    "KinkRungeKutta4",
     "LinePlatform",
     "LinearlyImplicit",
     "Method",

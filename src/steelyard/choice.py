@@ -13,6 +13,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cache
 from importlib.resources import files
+from itertools import count
 from operator import mul
 from typing import TYPE_CHECKING
 
@@ -27,6 +28,7 @@ from .integrators.exponential import ExponentialRungeKutta
 from .integrators.generalised_alpha import GeneralisedAlpha
 from .integrators.impact_rattle import ImpactRattle
 from .integrators.implicit_midpoint import ImplicitMidpoint
+from .integrators.kink_rk4 import KinkRungeKutta4
 from .integrators.linearly_implicit import LinearlyImplicit
 from .integrators.rattle import Rattle
 from .integrators.rk4 import RungeKutta4
@@ -94,6 +96,7 @@ CANDIDATES = (
     Candidate("symplectic Euler", SymplecticEuler()),
     Candidate("velocity Verlet", Rattle()),
     Candidate("RK4", RungeKutta4()),
+    Candidate("RK4, kinks inside", KinkRungeKutta4()),
     Candidate("exponential", ExponentialRungeKutta()),
     Candidate("linearly implicit", LinearlyImplicit()),
     Candidate("backward Euler", BackwardEuler()),
@@ -114,15 +117,29 @@ CANDIDATES = (
     Candidate("explicit Euler, worst first", ExplicitEuler(), WorstFirst()),
 )
 
-#: Times at which runs are compared.
+
+@dataclass(frozen=True)
+class _Margin:
+    """Shares of the tolerance that are aimed at and accepted, and the shorter steps, by so much, that must hold too.
+
+    Behind a kink or an impact errors jump with the step, and one step may hold by luck.
+    """
+
+    aim: float
+    accept: float
+    shorter: tuple[float, ...]
+
+
+#: Least number of times at which runs are compared. Runs of few steps are compared at other times, up to twice as many,
+#: so that any number of steps will do.
 _LOOKS = 20
 #: Most steps of a run; what needs more is out of reach.
 _MOST = 400_000
 #: Share of the tolerance that the reference may err by.
 _REFERENCE = 0.04
-#: Shares of it that are aimed at and accepted: where motion is smooth, and where it has kinks, since errors jump behind
-#: them and may be larger between the looks.
-_SMOOTH, _KINKED = (0.88, 0.96), (0.75, 0.9)
+
+_SMOOTH = _Margin(0.88, 0.96, (1.07, 1.19, 1.37))
+_KINKED = _Margin(0.75, 0.9, (1.03, 1.07, 1.11, 1.15, 1.19, 1.24, 1.3, 1.37))
 _KINKS = (Bungee, AnchoredBungee, Buoyancy, Cable, CableConstraint, *CONTACTS)
 _TRIES = 12
 #: Error from which on a run has blown up.
@@ -131,8 +148,6 @@ _LOST = 1e3
 _FARTHEST = 64.0
 #: Height [m] whose energy is the least that errors of energy are held against: what rests has no other.
 _LIFT = 1e-3
-#: Where errors do not fall smoothly, as after impacts, one step may hold by luck: these many more must hold too.
-_NEIGHBOURS = (1.07, 1.19, 1.37)
 
 
 @cache
@@ -218,7 +233,7 @@ class _Track:
 
 
 class _Runs:
-    """Runs of one candidate over the horizon, by steps per look."""
+    """Runs of one candidate over the horizon."""
 
     def __init__(self, candidate: Candidate, scene: Scene, horizon: float, since: float) -> None:
         from .world import World
@@ -229,16 +244,16 @@ class _Runs:
         self.exact = solver is None or solver.sparse
         self._scene = scene
         self._horizon = horizon
-        self._first = min(math.floor(_LOOKS * since / horizon + 1e-9), _LOOKS - 1)
+        self._since = since
         self._world: type[World] = World
-        self._tracks: dict[int, _Track | None] = {}
-        model = self._build(1).model
+        self._tracks: dict[tuple[int, int], _Track | None] = {}
+        model = self._build(_LOOKS).model
         each = cost_table()[candidate.name]
         self.step_cost = sum(map(mul, each, candidate.work(scene, model.words)))
 
     def dt(self, steps: int) -> float:
-        """Step [s]."""
-        return self._horizon / (_LOOKS * steps)
+        """Step [s] of a run of so many."""
+        return self._horizon / steps
 
     def cost(self, steps: int) -> float:
         """Expected cost [us per simulated second and world]."""
@@ -247,33 +262,37 @@ class _Runs:
     def _build(self, steps: int) -> World:
         return self._world(self._scene, method=self.candidate.at(self.dt(steps)))
 
-    def track(self, steps: int) -> _Track | None:
-        """The run, or None where it broke or is too long."""
-        if steps * _LOOKS > _MOST:
-            return None
-        if steps not in self._tracks:
-            self._tracks[steps] = self._run(steps)
-        return self._tracks[steps]
+    def track(self, steps: int, looks: int) -> _Track | None:
+        """The run, or None where it broke.
 
-    def _run(self, steps: int) -> _Track | None:
+        Args:
+            steps: how many, a multiple of the looks.
+            looks: at how many times.
+        """
+        if (steps, looks) not in self._tracks:
+            self._tracks[steps, looks] = self._run(steps, looks)
+        return self._tracks[steps, looks]
+
+    def _run(self, steps: int, looks: int) -> _Track | None:
         # What blows up may overflow before it is flagged.
         with np.errstate(all="ignore"):
-            track = self._follow(self._build(steps), steps)
+            track = self._follow(self._build(steps), steps // looks, looks)
         if track is None or not math.isfinite(track.distance(track)):
             return None
         return track
 
-    def _follow(self, world: World, steps: int) -> _Track | None:
+    def _follow(self, world: World, stride: int, looks: int) -> _Track | None:
         position, energy = [], []
         residual = kinetic = 0.0
-        for look in range(_LOOKS):
-            world.step(steps)
+        first = min(math.floor(looks * self._since / self._horizon + 1e-9), looks - 1)
+        for look in range(looks):
+            world.step(stride)
             if world.health[0]:
                 return None
             position.append(world.particles.position[0].copy())
             energy.append(float(world.energy[0]))
             links = world.residual[0]
-            if links.size and look >= self._first:
+            if links.size and look >= first:
                 residual = max(residual, float(np.abs(links).max()))
             speed = world.particles.velocity[0]
             kinetic = max(kinetic, 0.5 * float(world.particles.mass_or_zero[0] @ (speed**2).sum(1)))
@@ -282,17 +301,61 @@ class _Runs:
             particles.mass_or_zero[0] @ np.linalg.norm(particles.acceleration[0], axis=1)
         )
         scale = max(float(np.ptp(energy)), kinetic, weight * _LIFT)
-        first = self._first
         return _Track(np.stack(position[first:]), np.array(energy[first:]), residual, scale)
 
 
+@dataclass(frozen=True)
+class _Reference:
+    """The run that is known best.
+
+    Attributes:
+        run: of which candidate.
+        steps: of how many steps at least.
+        error: what halving its step changed; inf where there is no run.
+    """
+
+    run: _Runs
+    steps: int
+    error: float
+
+    def error_of(self, run: _Runs, steps: int) -> float:
+        """Error of another run, looked at as often as its number of steps allows; inf where it broke."""
+        looks = _looks(steps)
+        track = run.track(steps, looks)
+        true = self.run.track(looks * math.ceil(self.steps / looks), looks)
+        if track is None or true is None:
+            return math.inf
+        error = track.distance(true) + self.error
+        return error if error < _LOST else math.inf
+
+
+def _looks(steps: int) -> int:
+    """At how many times a run of so many steps is looked at."""
+    return steps // max(1, steps // _LOOKS)
+
+
+def _down(steps: int) -> int:
+    """So many steps or a few less, so that looks at them are evenly spaced."""
+    stride = max(1, steps // _LOOKS)
+    looks = steps // stride if steps < _LOOKS**2 else _LOOKS
+    return stride * max(looks, _LOOKS)
+
+
+def _whole(steps: float) -> int:
+    """So many steps or a few more, so that looks at them are evenly spaced."""
+    least = max(math.ceil(steps), _LOOKS)
+    return next(whole for whole in count(least) if _down(whole) == whole)
+
+
 def candidates(scene: Scene) -> Iterator[Candidate]:
-    """The candidates that can step a scene; with a solver, or with resolved impacts, only where there may be any."""
+    """The candidates that can step a scene; with a solver, or with events resolved, only where there may be any."""
     impacts = bool(scene.of(Cable, CableConstraint, Ground, LinePlatform, Collisions))
+    kinks = bool(scene.of(Bungee, AnchoredBungee, Buoyancy))
     held = bool(scene.of(*LINKS, *CONTACTS, Rider))
     for candidate in CANDIDATES:
         holds = candidate.solver is not None or candidate.integrator.holds_links
-        if held == holds and (impacts or not candidate.integrator.splits):
+        dividing = kinks if candidate.integrator.smooth else impacts
+        if held == holds and (dividing or not candidate.integrator.splits):
             try:
                 candidate.at(1.0).refuse(scene)
             except ValueError:
@@ -300,24 +363,25 @@ def candidates(scene: Scene) -> Iterator[Candidate]:
             yield candidate
 
 
-def _reference(runs: list[_Runs], start: int, tolerance: float) -> tuple[_Track | None, float]:
+def _reference(runs: list[_Runs], start: int, tolerance: float) -> _Reference:
     """The run that is known best, and its error by halving the step.
 
     Sweeps may leave an error that no step takes away, so their runs are no reference where others are.
     """
     trusted = [run for run in runs if run.exact] or runs
-    best: tuple[_Track | None, float] = (None, math.inf)
+    best = _Reference(trusted[0], start, math.inf)
     # Of one order, those that resolve impacts first.
     for run in sorted(trusted, key=lambda run: (-run.order, not run.candidate.integrator.splits)):
         steps, change = start, math.inf
-        before = run.track(steps)
-        while (finer := run.track(2 * steps)) is not None or 2 * steps * _LOOKS <= _MOST:
+        before = run.track(steps, _LOOKS)
+        while 2 * steps <= _MOST:
             steps *= 2
+            finer = run.track(steps, _LOOKS)
             if finer is not None and before is not None:
                 last, change = change, finer.distance(before)
                 # What is left of a method of first order, and more than that of others.
-                if change < best[1]:
-                    best = finer, change
+                if change < best.error:
+                    best = _Reference(run, steps, change)
                 if change <= _REFERENCE * tolerance and _confirmed(run, steps, finer, tolerance):
                     return best
                 if change > 0.9 * last:
@@ -328,69 +392,63 @@ def _reference(runs: list[_Runs], start: int, tolerance: float) -> tuple[_Track 
 
 def _confirmed(run: _Runs, steps: int, track: _Track, tolerance: float) -> bool:
     """Whether a step between the last two gives the same: impacts may fall alike in a step and in its half."""
-    between = run.track(math.ceil(0.7 * steps))
+    between = run.track(_LOOKS * math.ceil(0.7 * steps / _LOOKS), _LOOKS)
     return between is not None and between.distance(track) <= 2.0 * _REFERENCE * tolerance
 
 
 def _smallest(
     run: _Runs,
-    reference: _Track,
-    known: float,
+    reference: _Reference,
     start: int,
     tolerance: float,
     limit: float,
-    shares: tuple[float, float],
+    margin: _Margin,
 ) -> tuple[int | None, float, float]:
-    """Fewest steps per look that hold the tolerance, at less than the cost ``limit``.
+    """Fewest steps that hold the tolerance, at less than the cost ``limit``.
 
     Returns:
         The steps or None, the error there, and the least error seen.
     """
-    aim, accept = shares
+    most = margin.accept * tolerance
     tried: dict[int, float] = {}
     low, high, steps = 0, 0, start
     for _ in range(_TRIES):
         if run.cost(steps) > limit and not high:
-            steps = max(low + 1, int(steps * 0.98 * limit / run.cost(steps)))
+            steps = max(_whole(low + 1), _down(int(steps * limit / run.cost(steps))))
             if steps in tried or run.cost(steps) > limit:
                 break
-
-        def error_at(count: int) -> float:
-            track = run.track(count)
-            found = math.inf if track is None else track.distance(reference) + known
-            return found if found < _LOST else math.inf
-
-        error = error_at(steps)
+        error = reference.error_of(run, steps)
         tried[steps] = error
-        if error <= accept * tolerance:
-            more = [math.ceil(factor * steps) for factor in _NEIGHBOURS]
-            lucky = [count for count in more if error_at(count) > accept * tolerance]
+        if error <= most:
+            near = [_whole(factor * steps) for factor in margin.shorter]
+            more = {shorter: reference.error_of(run, shorter) for shorter in near}
+            lucky = [shorter for shorter, found in more.items() if found > most]
             if lucky:
                 low = max(low, min(max(lucky), high - 1) if high else max(lucky))
-                error = max(map(error_at, lucky))
+                error = max(more.values())
             else:
                 high = min(high or steps, steps)
         else:
             low = max(low, steps)
-        finite = sorted((k, e) for k, e in tried.items() if known < e < math.inf)
+        finite = sorted((k, e) for k, e in tried.items() if reference.error < e < math.inf)
         order = float(run.order)
         if len(finite) > 1:
             (k0, e0), (k1, e1) = finite[-2:]
             order = min(max(math.log(e0 / e1) / math.log(k1 / k0), 0.5), order)
-        growth = math.log(max(error, 1e-300) / (aim * tolerance)) / order
+        growth = math.log(max(error, 1e-300) / (margin.aim * tolerance)) / order
         factor = 4.0 if error == math.inf else math.exp(min(growth, math.log(_FARTHEST)))
-        wanted = math.ceil(factor * steps)
+        wanted = _whole(factor * steps)
         if high:
             # What breaks below a step says nothing of how far below: the middle of what is left is next.
             broken = tried.get(low, 0.0) == math.inf
-            middle = math.ceil(math.sqrt(max(low, 1) * high))
+            middle = _whole(math.sqrt(max(low, 1) * high))
             wanted = middle if error == math.inf else max(wanted, middle if broken else low + 1)
-            wanted = min(wanted, high)
+            wanted = min(_whole(wanted), high)
             if wanted > 0.97 * high:
                 break
         else:
-            wanted = max(wanted, low + 1)
-        if wanted * _LOOKS > _MOST:
+            wanted = max(wanted, _whole(low + 1))
+        if wanted > _MOST:
             break
         steps = wanted
     least = min(tried.values(), default=math.inf)
@@ -426,21 +484,21 @@ def choose_method(
     span = checks.number(owner, "horizon", horizon, above=0.0, remedy="Use 1 s.")
     first = checks.number(owner, "since", since, least=0.0, most=span, remedy="Use 0 s.")
     scene.check()
-    start = max(1, math.ceil(60.0 * span / _LOOKS))
+    start = _LOOKS * max(1, math.ceil(60.0 * span / _LOOKS))
     runs = [_Runs(candidate, scene, span, first) for candidate in candidates(scene)]
-    shares = _KINKED if scene.of(*_KINKS) else _SMOOTH
-    reference, known = _reference(runs, start, allowed)
+    margin = _KINKED if scene.of(*_KINKS) else _SMOOTH
+    reference = _reference(runs, start, allowed)
     found: list[Considered] = []
-    best, limit = known, math.inf
-    if reference is not None and known <= 0.5 * allowed:
+    best, limit = reference.error, math.inf
+    if reference.error <= 0.5 * allowed:
         for run in sorted(runs, key=lambda run: (-run.order, run.step_cost)):
             name = run.candidate.name
-            steps, error, least = _smallest(run, reference, known, start, allowed, limit, shares)
+            steps, error, least = _smallest(run, reference, start, allowed, limit, margin)
             best = min(best, least)
             if steps is None:
                 verdict = (
                     f"dearer than the best; {least:.2g} was seen"
-                    if run.cost(_MOST // _LOOKS) > limit
+                    if run.cost(_MOST) > limit
                     else f"does not hold it; {least:.2g} was seen"
                 )
                 found.append(Considered(name, None, math.inf, math.inf, verdict))

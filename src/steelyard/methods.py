@@ -120,7 +120,7 @@ class Method:
                 "WorstFirst cannot hold a Rider: it has no impulse for it. Use Direct(), or spread "
                 "the load's mass over the deck (steelyard.scenes.lumped_masses)."
             )
-        if self.integrator.splits:
+        if self.integrator.splits and not self.integrator.smooth:
             self._refuse_divided(name, scene)
         if self.integrator.reverses:
             self._refuse_backwards(name, scene)

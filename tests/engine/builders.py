@@ -40,6 +40,7 @@ COMPOSED = {
 # What steps particles under forces alone.
 SMOOTH = {
     "RungeKutta4": (sy.RungeKutta4(), None),
+    "KinkRungeKutta4": (sy.KinkRungeKutta4(), None),
     "ExponentialRungeKutta": (sy.ExponentialRungeKutta(), None),
     "LinearlyImplicit": (sy.LinearlyImplicit(), None),
     "BackwardEuler": (sy.BackwardEuler(passes=4, tolerance=1e-3), None),

@@ -18,6 +18,7 @@ Array = np.ndarray
 
 METHODS = [
     sy.RungeKutta4(),
+    sy.KinkRungeKutta4(),
     sy.ExponentialRungeKutta(),
     sy.LinearlyImplicit(),
     sy.BackwardEuler(),

@@ -65,6 +65,7 @@ HELD = [thing for thing in things(A, B) if isinstance(thing, (*LINKS, *CONTACTS,
 STAGED = [sy.Direct(), sy.GaussSeidel()]
 SMOOTH = [
     sy.RungeKutta4(),
+    sy.KinkRungeKutta4(),
     sy.ExponentialRungeKutta(),
     sy.LinearlyImplicit(),
     sy.BackwardEuler(),

@@ -10,6 +10,7 @@ NAMES = (
     "projectile",
     "spring",
     "bungee",
+    "net",
     "buoyancy",
     "pendulum",
     "triple_pendulum",

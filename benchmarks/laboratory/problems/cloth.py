@@ -2,8 +2,8 @@
 
     python -m benchmarks.laboratory.problems.cloth
 
-writes data/cloth.npz: the motion by DOP853 (``benchmarks.cloth``), to 1e-12. Integrated to 1e-10 it is the same to
-within 1e-9 m.
+writes data/cloth.npz: the motion by DOP853 (``benchmarks.spring_network``), to 1e-12. Integrated to 1e-10 it is the
+same to within 1e-9 m.
 """
 
 from __future__ import annotations
@@ -13,10 +13,9 @@ from functools import partial
 import numpy as np
 
 import steelyard as sy
-from benchmarks.cloth import spring_accelerations, spring_motion
 from benchmarks.laboratory.pendulums import DATA
 from benchmarks.laboratory.problem import Motion, Problem, energy, trajectory
-from benchmarks.scenes import Array
+from benchmarks.spring_network import SpringNetwork
 
 MASS, WIDTH, GRAVITY, STRETCH, LOOKS = 0.4, 1.0, 9.81, 0.05, (1, 2, 3, 4)
 STORED = DATA / "cloth.npz"
@@ -24,7 +23,8 @@ STORED = DATA / "cloth.npz"
 
 def integrate(*, tolerance: float = 1e-12) -> Motion:
     """The motion at the looks."""
-    return Motion(*spring_motion(sy.scenes.cloth(), STRETCH * np.array(LOOKS), tolerance=tolerance))
+    network = SpringNetwork(sy.scenes.cloth())
+    return Motion(*network.motion(STRETCH * np.array(LOOKS), tolerance=tolerance))
 
 
 def stored() -> Motion:
@@ -43,18 +43,7 @@ def upside_down() -> sy.Scene:
 def problems() -> tuple[Problem, ...]:
     """The cloth."""
     true = stored()
-    scene = sy.scenes.cloth()
-    inverse, _, incidence, stiffness, rest = spring_accelerations(scene)
-    mass = np.where(inverse > 0.0, 1.0 / np.where(inverse > 0.0, inverse, 1.0), 0.0)[:, 0]
-
-    def of(position: Array, velocity: Array) -> Array:
-        found = []
-        for x, v in zip(position, velocity, strict=True):
-            length = np.sqrt(((incidence @ x) ** 2).sum(axis=1, keepdims=True))
-            lift = mass @ (0.5 * (v**2).sum(axis=1) + GRAVITY * x[:, 1])
-            found.append(lift + 0.5 * float((stiffness * (length - rest) ** 2).sum()))
-        return np.array(found)
-
+    of = SpringNetwork(sy.scenes.cloth()).energy
     return (
         Problem(
             name="cloth",

@@ -54,8 +54,13 @@ class Integrator:
 
     #: Whether part of its step runs backwards in time.
     reverses: ClassVar[bool] = False
-    #: Whether its step is divided where impacts are.
+    #: Whether its step is divided where impacts are, or kinks of the forces.
     splits: ClassVar[bool] = False
+
+    @property
+    def divisions(self) -> int:
+        """Most events that divide a step."""
+        return 0
 
     @property
     def fractions(self) -> tuple[float, ...]:
@@ -79,7 +84,7 @@ class Integrator:
         raise NotImplementedError
 
     def parts(self, solver: Solver | None, acting: Acting) -> Recipe:
-        """Stages of one of the parts into which impacts divide a step; none where they do not."""
+        """Stages of one of the parts into which events divide a step; none where they do not."""
         return ()
 
     def order(self) -> int:

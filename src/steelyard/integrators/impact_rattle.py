@@ -29,7 +29,7 @@ from ..constraints.contacts import contact_shift, contact_speed
 from ..constraints.controls import move_controls
 from ..constraints.links import link_half_square, link_rate
 from ..kernel import inner
-from ..math.lanes import absolute, any_lane, fma, load, select, splat, store
+from ..math.lanes import absolute, any_lane, load, select, splat, store
 from ..math.pointers import LANES
 from ..model.tape import (
     CONTACT,
@@ -44,11 +44,9 @@ from ..model.tape import (
     H_DT,
     H_EVENTS,
     H_IMPACTS,
-    H_KEPT,
     H_LINKS,
     H_PARTICLES,
     H_PARTS,
-    H_STATE_ROWS,
     H_TRIAL,
     LINK,
 )
@@ -58,16 +56,13 @@ from ..solvers.gather import scale_multipliers
 from ..solvers.stages import begin_step
 from ..stage import call_stage, stage
 from .base import Acting, Integrator, Recipe
+from .divided import PAST, SHORTEST, TRIALS, fall_time, keep_state, put_back
 from .rattle import rattle_halves
 
 # Rows of an event: gap [m] or slack (L^2 - d^2)/2, and its rate, where the part of the step begins; whether it may
 # close, closes in this part, and at which rate it leaves; of a contact also its frame at the impact, and what its gap
 # along that frame is where the part begins.
 _GAP, _RATE, _FREE, _CLOSES, _LEAVES, _BEFORE, _FRAME = range(7)
-_TRIALS = 3
-_BISECTIONS = 50
-# Shortest part of a step, and how far past the impact it goes, so that the contact is felt, over the step.
-_SHORTEST, _PAST = 1e-6, 1e-10
 # Impacts so close in time, over the step, are one.
 _TOGETHER = 1e-8
 # What is no farther off, and comes no nearer within the step [m; of a cable's length squared], is at rest.
@@ -91,6 +86,11 @@ class ImpactRattle(Integrator):
 
     def __post_init__(self) -> None:
         checks.whole("ImpactRattle", "impacts", self.impacts, least=1, remedy="Use 4.")
+
+    @property
+    def divisions(self) -> int:
+        """Most events that divide a step."""
+        return self.impacts
 
     def recipe(self, solver: Solver | None, acting: Acting) -> Recipe:
         """One stage that runs those of ``parts``."""
@@ -184,27 +184,6 @@ def note_gaps(tape, s, skip, part):
 
 
 @inner
-def _fall_time(gap, rate, later, later_rate, length):
-    """When the cubic through both ends falls through 0, by bisection: it is above at first and below at last."""
-    half = splat(0.5)
-    one = splat(1.0)
-    inverse = one / length
-    change = (later - gap) * inverse
-    bend = splat(3.0) * change - splat(2.0) * rate - later_rate
-    twist = rate + later_rate - splat(2.0) * change
-    low = splat(0.0)
-    high = length
-    for _ in range(_BISECTIONS):
-        time = half * (low + high)
-        share = time * inverse
-        value = fma(time, fma(share, fma(share, twist, bend), rate), gap)
-        above = value > splat(0.0)
-        low = select(above, time, low)
-        high = select(above, high, time)
-    return half * (low + high)
-
-
-@inner
 def _earliest(s, event, gap, rate, first, length, active, time):
     """The earlier of ``time`` and when this one closes; on later trials by Newton's method from the present end."""
     zero = splat(0.0)
@@ -215,7 +194,7 @@ def _earliest(s, event, gap, rate, first, length, active, time):
         start_rate = load(s, event + _RATE)
         closes = free & (gap < zero) & ((start > zero) | (start_rate > zero))
         touches = free & (gap < zero) & (start <= zero) & (start_rate <= zero)
-        found = _fall_time(start, start_rate, gap, rate, length)
+        found = fall_time(start, start_rate, gap, rate, length)
         found = select(closes, found, select(touches, zero, time))
     else:
         closing = free & (rate < zero)
@@ -317,13 +296,6 @@ def _run(tape, s, skip, length, share):
     contact_geometry(tape, s)
 
 
-@inner
-def _put_back(tape, s, worlds):
-    """State of some worlds as it was kept."""
-    for row in range(tape[H_STATE_ROWS]):
-        store(s, row, select(worlds, load(s, tape[H_KEPT] + row), load(s, row)))
-
-
 @stage
 def impact_rattle_step(tape, s, skip, part):
     """Parts of the step, each up to the next impact."""
@@ -333,11 +305,10 @@ def impact_rattle_step(tape, s, skip, part):
     dt = load(s, tape[H_DT])
     left = dt
     active = dt > zero
-    shortest = splat(_SHORTEST) * dt
+    shortest = splat(SHORTEST) * dt
     _forget_impacts(tape, s)
     for turn in range(tape[H_IMPACTS] + 1):
-        for row in range(tape[H_STATE_ROWS]):
-            store(s, tape[H_KEPT] + row, load(s, row))
+        keep_state(tape, s)
         trial = one if turn < tape[H_IMPACTS] else zero
         store(s, tape[H_TRIAL], trial)
         length = left
@@ -349,8 +320,8 @@ def impact_rattle_step(tape, s, skip, part):
             meets = active & (time < left)
             if any_lane(meets):
                 length = select(time > shortest, time, shortest)
-                for _ in range(1, _TRIALS):
-                    _put_back(tape, s, zero <= zero)
+                for _ in range(1, TRIALS):
+                    put_back(tape, s, zero <= zero)
                     _run(tape, s, skip, length, length / dt)
                     time = _when(tape, s, False, length, left, active)
                     # A part that is as short as may be stays so.
@@ -360,16 +331,16 @@ def impact_rattle_step(tape, s, skip, part):
                     length = length + change
                     length = select(length > shortest, length, shortest)
                 _note_impacts(tape, s, meets, splat(_TOGETHER) * dt + shortest)
-                length = select(meets, length + splat(_PAST) * dt, length)
+                length = select(meets, length + splat(PAST) * dt, length)
                 store(s, tape[H_TRIAL], select(meets, zero, one))
-                _put_back(tape, s, zero <= zero)
+                put_back(tape, s, zero <= zero)
                 _run(tape, s, skip, length, length / dt)
                 _forget_impacts(tape, s)
                 # An impact lasts no time: what it does to places says nothing of loads, and those before it are gone.
                 back = select(meets, zero, back)
         scale_multipliers(tape, s, back)
         done = select(active, zero, one) > half
-        _put_back(tape, s, done)
+        put_back(tape, s, done)
         left = select(active, left - length, dt)
         active = active & (left > shortest)
         left = select(active, left, dt)

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ..forces.springs import ONE_SIDED
 from ..integrators.base import Acting, Recipe
 from ..math.pointers import LANES
 from ..methods import Method
@@ -25,7 +26,7 @@ from .parameters import PARTICLES, Key, Parameters, Slot
 from .propagators import add_propagators
 from .saddle import Saddle
 from .stiffness import Stiffness
-from .tape import COMPLIANCE, CONTACT, EVENT, HEADER, LINK
+from .tape import COMPLIANCE, CONTACT, EVENT, HEADER, KINK, KINK_ROWS, LINK
 
 #: Header fields that are -1, not an empty section, where a scene has no such rows.
 _ABSENT = ("user_forces", "force", "start", "free", "impulse", "dense")
@@ -92,7 +93,7 @@ class Compiler:
             "springs": 7, "gravities": 3, "buoyancies": 5, "drags": 7, "stiff_springs": 8, "drift": 1,
             "winches": 3, "movers": 5, "links": LINK, "contacts": CONTACT, "generators": 2,
             "recipe": 2, "unknowns": 4, "spring_blocks": 4, "drag_blocks": 1, "float_blocks": 1,
-            "propagators": 2, "parts": 2, "compliances": COMPLIANCE,
+            "propagators": 2, "parts": 2, "compliances": COMPLIANCE, "kinks": KINK,
         }  # fmt: skip
         self.next_row = 0
         self.start: list[float] = []
@@ -201,6 +202,7 @@ class Compiler:
         self.minus_one = self.constant(-1.0)
         self._particles()
         add_forces(self)
+        self._events()
         add_links(self)
         add_compliances(self)
         add_riders(self)
@@ -302,20 +304,37 @@ class Compiler:
         self.header["dt"] = self.constant(method.substep)
         self.header["divisions"] = method.substeps
         self._substeps()
-        self._events()
 
     def _events(self) -> None:
-        """Where impacts divide the step: copies of the state and notes of what may close."""
-        header = self.header
-        header["impacts"] = getattr(self.method.integrator, "impacts", 0)
+        """Where impacts or kinks divide the step: copies of the state and notes of what may happen."""
+        header, integrator = self.header, self.method.integrator
+        header["impacts"] = integrator.divisions
         header["events"] = header["kept"] = header["trial"] = header["damping_rates"] = -1
-        if self.method.integrator.splits:
+        if integrator.splits:
+            header["kept"] = self.take(self.model.state_rows)
+        if integrator.splits and integrator.smooth:
+            kinks = [
+                word
+                for a, b, _, _, _, rest, kind in self._records("springs")
+                if kind == ONE_SIDED
+                for word in (tape.BUNGEE, a, b, rest)
+            ]
+            for y, _, surface, half, _ in self._records("buoyancies"):
+                for kind in (tape.FLOAT_TOP, tape.FLOAT_BOTTOM):
+                    kinks += [kind, y, surface, half]
+            self.sections["kinks"] = kinks
+            header["events"] = self.take(KINK_ROWS * (len(kinks) // KINK))
+        elif integrator.splits:
             closing = len(self.contacts) + sum(map(self.is_cable, self.links))
             header["events"] = self.take(EVENT * closing)
-            header["kept"] = self.take(self.model.state_rows)
             header["trial"] = self.take(1)
             rates = ((PARTICLES, "damping"),)
             header["damping_rates"] = self.slot(len(self.particles), rates, derived.rate)
+
+    def _records(self, name: str) -> list[list[int]]:
+        """Records of a section."""
+        words, width = self.sections[name], self.widths[name]
+        return [words[k : k + width] for k in range(0, len(words), width)]
 
     def _substeps(self) -> None:
         """Lengths, what damping keeps and how impulses grow, of each part of a step that is made of several."""

@@ -105,8 +105,9 @@ from __future__ import annotations
     H_KEPT,
     H_TRIAL,
     H_DAMPING_RATES,
-) = range(96)
-HEADER = 96
+    H_KINKS,
+) = range(97)
+HEADER = 97
 
 # Width of the records of links, contacts and springs that a solver holds; written field by field.
 LINK = 17
@@ -115,6 +116,10 @@ SADDLE_LINK = 10
 COMPLIANCE = 10
 # Work rows of a contact or cable whose impact is resolved inside the step.
 EVENT = 15
+# Record of a kink whose time is resolved: its kind, the row of what moves, the other end's and the length's, or the
+# surface's and the half depth's; and its work rows.
+KINK, KINK_ROWS = 4, 3
+BUNGEE, FLOAT_TOP, FLOAT_BOTTOM = range(3)
 
 # Records of clusters and of loads on them: what comes before their lists, and an entry of a cluster's. Work rows of a
 # cluster: inertia, inverse of that with loads, quaternion (angular velocity in the velocity stage), shift of the centre
