@@ -8,9 +8,8 @@ from ..model.tape import H_KEPT, H_STATE_ROWS
 
 # Shortest part of a step, and how far past the event it goes, so that the event is behind it, over the step.
 SHORTEST, PAST = 1e-6, 1e-10
-# Trials of a part: up to the root of the cubic, then what Newton's method mends, until rounding is left.
-TRIALS = 3
-_BISECTIONS = 50
+# To a millionth of the step, which the cubic seldom deserves and Newton's method then mends.
+_BISECTIONS = 20
 
 
 @inner

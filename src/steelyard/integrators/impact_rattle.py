@@ -8,9 +8,7 @@ to ``impacts`` times. What is left after those is taken as ``Rattle`` takes it; 
 
 Order 2 with impacts too, where ``Rattle`` has order 1 in their time; a ball on level ground is exact. Energy is kept by
 restitution 1 across impacts to the error of their speed. Contacts and cables that carry load, and those that start in
-penetration, are held as by ``Rattle``. A step without an impact takes one of ``Rattle``, with the factor of its start
-made anew, one with an impact four; over whole motions, of balls or of cables, that was 1.9 to 4.2 times the cost of
-``Rattle`` at the same step (``make charts``).
+penetration, are held as by ``Rattle``. A step without an impact takes one of ``Rattle``, one with an impact four.
 
 Works with Direct alone, since sweeps leave errors larger than those of the time. Refuses what is tabulated for one
 length of the step or known only between steps: drag, stiff springs, user-written forces and contacts.
@@ -33,6 +31,7 @@ from ..math.lanes import absolute, any_lane, load, select, splat, store
 from ..math.pointers import LANES
 from ..model.tape import (
     CONTACT,
+    DIVIDED,
     EVENT,
     FRESH,
     H_BLOCKS,
@@ -56,13 +55,15 @@ from ..solvers.gather import scale_multipliers
 from ..solvers.stages import begin_step
 from ..stage import call_stage, stage
 from .base import Acting, Integrator, Recipe
-from .divided import PAST, SHORTEST, TRIALS, fall_time, keep_state, put_back
+from .divided import PAST, SHORTEST, fall_time, keep_state, put_back
 from .rattle import rattle_halves
 
 # Rows of an event: gap [m] or slack (L^2 - d^2)/2, and its rate, where the part of the step begins; whether it may
 # close, closes in this part, and at which rate it leaves; of a contact also its frame at the impact, and what its gap
 # along that frame is where the part begins.
 _GAP, _RATE, _FREE, _CLOSES, _LEAVES, _BEFORE, _FRAME = range(7)
+# Trials that Newton's method mends: rounding is left.
+_MENDED = 2
 # Impacts so close in time, over the step, are one.
 _TOGETHER = 1e-8
 # What is no farther off, and comes no nearer within the step [m; of a cable's length squared], is at rest.
@@ -194,8 +195,10 @@ def _earliest(s, event, gap, rate, first, length, active, time):
         start_rate = load(s, event + _RATE)
         closes = free & (gap < zero) & ((start > zero) | (start_rate > zero))
         touches = free & (gap < zero) & (start <= zero) & (start_rate <= zero)
-        found = fall_time(start, start_rate, gap, rate, length)
-        found = select(closes, found, select(touches, zero, time))
+        found = select(touches, zero, time)
+        if any_lane(closes):
+            fallen = fall_time(start, start_rate, gap, rate, length)
+            found = select(closes, fallen, found)
     else:
         closing = free & (rate < zero)
         found = length + gap / select(closing, zero - rate, splat(1.0))
@@ -282,14 +285,15 @@ def _set_length(tape, s, length):
 
 
 @inner
-def _run(tape, s, skip, length, share):
+def _run(tape, s, skip, length, share, fresh):
     """One step of RATTLE over ``length``, ``share`` of the whole; contact gaps at its end.
 
-    Multipliers are those of a whole step between parts; they grow with the square of its length.
+    Multipliers are those of a whole step between parts; they grow with the square of its length. ``fresh``: whether the
+    factor at hand is not of the state it begins from.
     """
     _set_length(tape, s, length)
     scale_multipliers(tape, s, share * share)
-    skip[tape[H_BLOCKS] + FRESH] = 1
+    skip[tape[H_BLOCKS] + FRESH] = fresh
     at = tape[H_PARTS]
     for index in range(tape[at]):
         call_stage(tape[at + 1 + 2 * index], tape, s, skip, tape[at + 2 + 2 * index])
@@ -307,22 +311,28 @@ def impact_rattle_step(tape, s, skip, part):
     active = dt > zero
     shortest = splat(SHORTEST) * dt
     _forget_impacts(tape, s)
+    words = tape[H_BLOCKS]
+    # What was put back after the last step was solved has no factor at hand.
+    fresh = 1 if skip[words + FRESH] != 0 or skip[words + DIVIDED] != 0 else 0
+    skip[words + DIVIDED] = 0
     for turn in range(tape[H_IMPACTS] + 1):
         keep_state(tape, s)
         trial = one if turn < tape[H_IMPACTS] else zero
         store(s, tape[H_TRIAL], trial)
         length = left
         share = length / dt
-        _run(tape, s, skip, length, share)
+        _run(tape, s, skip, length, share, fresh)
+        fresh = 1
         back = one / (share * share)
         if turn < tape[H_IMPACTS]:
             time = _when(tape, s, True, length, left, active)
             meets = active & (time < left)
             if any_lane(meets):
+                skip[words + DIVIDED] = 1
                 length = select(time > shortest, time, shortest)
-                for _ in range(1, TRIALS):
+                for _ in range(_MENDED):
                     put_back(tape, s, zero <= zero)
-                    _run(tape, s, skip, length, length / dt)
+                    _run(tape, s, skip, length, length / dt, 1)
                     time = _when(tape, s, False, length, left, active)
                     # A part that is as short as may be stays so.
                     change = select(meets, time - length, zero)
@@ -334,7 +344,7 @@ def impact_rattle_step(tape, s, skip, part):
                 length = select(meets, length + splat(PAST) * dt, length)
                 store(s, tape[H_TRIAL], select(meets, zero, one))
                 put_back(tape, s, zero <= zero)
-                _run(tape, s, skip, length, length / dt)
+                _run(tape, s, skip, length, length / dt, 1)
                 _forget_impacts(tape, s)
                 # An impact lasts no time: what it does to places says nothing of loads, and those before it are gone.
                 back = select(meets, zero, back)

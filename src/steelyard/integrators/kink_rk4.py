@@ -2,11 +2,12 @@
 
 A bungee pulls from its length on, and a float is lifted as far as it is under: there the force is continuous but its
 slope is not, and a step across is off by h^3. Where a step crosses such a kink, the cubic through both its ends tells
-when; two trials that end there mend the time by Newton's method. The step is then taken up to the kink, which is one
-of ``RungeKutta4`` on a smooth force, and what is left of it follows in the same way, up to ``kinks`` times.
+when, and a trial that ends there mends the time by Newton's method; as the force is continuous, what is left of it
+counts by its square. The step is then taken up to the kink, which is one of ``RungeKutta4`` on a smooth force, and the
+rest of it follows in the same way, up to ``kinks`` times.
 
 Order 4 across kinks, but those that are crossed and crossed back within a step are not seen. Everything else is as
-``RungeKutta4`` has it. A step that crosses nothing takes one of it, one that crosses five. Refuses links, riders and
+``RungeKutta4`` has it. A step that crosses nothing takes one of it, one that crosses four. Refuses links, riders and
 contacts, and user-written forces, which are known only between steps.
 
 Source: Hairer, Norsett & Wanner, *Solving Ordinary Differential Equations I*, II.6 (dense output and events).
@@ -35,7 +36,7 @@ from ..scene import checks
 from ..solvers.base import Solver
 from ..stage import call_stage, stage
 from .base import Acting, Recipe
-from .divided import PAST, SHORTEST, TRIALS, fall_time, keep_state, put_back
+from .divided import PAST, SHORTEST, fall_time, keep_state, put_back
 from .rk4 import RungeKutta4
 
 # Rows of a kink: how far from it [m] and how fast where the part of the step begins, and on which side.
@@ -128,15 +129,18 @@ def _first_crossing(tape, s, first, length, left):
         later = side * place
         later_rate = side * rate
         if first:
-            start = side * load(s, event + _PLACE)
-            start = select(start > zero, start, zero)
-            found = fall_time(start, side * load(s, event + _RATE), later, later_rate, length)
-            found = select(later < zero, found, time)
+            if any_lane(later < zero):
+                start = side * load(s, event + _PLACE)
+                start = select(start > zero, start, zero)
+                rate = side * load(s, event + _RATE)
+                found = fall_time(start, rate, later, later_rate, length)
+                found = select(later < zero, found, time)
+                time = select(found < time, found, time)
         else:
             closing = later_rate < zero
             found = length + later / select(closing, zero - later_rate, splat(1.0))
             found = select(closing, found, time)
-        time = select(found < time, found, time)
+            time = select(found < time, found, time)
         event += 3
     return time
 
@@ -168,14 +172,13 @@ def kink_rk4_step(tape, s, skip, part):
             meets = active & (time < left)
             if any_lane(meets):
                 length = select(meets, select(time > shortest, time, shortest), left)
-                for _ in range(1, TRIALS):
-                    put_back(tape, s, zero <= zero)
-                    _run(tape, s, skip, length)
-                    time = _first_crossing(tape, s, False, length, left)
-                    change = select(meets, time - length, zero)
-                    change = select(absolute(change) < splat(0.1) * length, change, zero)
-                    length = length + change
-                    length = select(length > shortest, length, shortest)
+                put_back(tape, s, zero <= zero)
+                _run(tape, s, skip, length)
+                time = _first_crossing(tape, s, False, length, left)
+                change = select(meets, time - length, zero)
+                change = select(absolute(change) < splat(0.1) * length, change, zero)
+                length = length + change
+                length = select(length > shortest, length, shortest)
                 length = select(meets, length + splat(PAST) * dt, left)
                 put_back(tape, s, zero <= zero)
                 _run(tape, s, skip, length)

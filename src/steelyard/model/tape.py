@@ -130,8 +130,9 @@ INERTIA, INVERSE, TURN, SHIFT, CENTRE, DELTA, BASE, MEAN, ARMS = 0, 6, 12, 15, 1
 ARM, BEFORE, AFTER, MOTION, LOAD_ROWS = 0, 3, 6, 9, 12
 
 # Words behind the flags of blocks in ``skip``, from H_BLOCKS on: whether the factor and the forces at hand are not of
-# the step's start, and whether worlds in which a contact slips or opens are to be given up.
-FRESH, HASTY, WORDS = range(3)
+# the step's start, whether worlds in which a contact slips or opens are to be given up, and whether events divided the
+# last step.
+FRESH, HASTY, DIVIDED, WORDS = range(4)
 
 # Codes of contact geometries.
 GROUND, LINE, USER, BALLS = range(4)
