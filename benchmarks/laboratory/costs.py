@@ -25,7 +25,7 @@ TABLE = record.ROOT / "src" / "steelyard" / "costs.json"
 
 
 def measured() -> dict[str, list[tuple[float, ...]]]:
-    """By method: what ``Candidate.work`` counts, then the cost of a step [us]; a row per problem."""
+    """By method: what ``Candidate.work`` counts, then the cost of running a step once [us]; a row per problem."""
     rows: dict[str, list[tuple[float, ...]]] = {}
     for name in problems.NAMES:
         found = json.loads((CHARTS / f"{name}.json").read_text())["variants"]
@@ -34,8 +34,10 @@ def measured() -> dict[str, list[tuple[float, ...]]]:
             if scene.of(sy.ContactGenerator):
                 continue
             for candidate in methods.able(problem, scene):
+                kinked = candidate.integrator.divisions > 0 and candidate.solver is None
+                events = sy.kinks_per_second(scene, problem.duration) if kinked else 0.0
                 costs = [
-                    point["per_second"] * point["dt"]
+                    point["per_second"] * point["dt"] / candidate.runs(events * point["dt"])
                     for point in found[problem.name]["points"]
                     if point["method"] == candidate.name
                     and point["per_second"]

@@ -1,7 +1,15 @@
 """Steelyard: a batched physics engine that lets you weigh speed against accuracy."""
 
 from . import draw, extension, scenes
-from .choice import CANDIDATES, Candidate, Choice, Considered, candidates, choose_method
+from .choice import (
+    CANDIDATES,
+    Candidate,
+    Choice,
+    Considered,
+    candidates,
+    choose_method,
+    kinks_per_second,
+)
 from .integrators.backward_euler import BackwardEuler
 from .integrators.closed_form import ClosedForm, flight, flight_fall_time, flight_impact
 from .integrators.composed_rattle import ComposedRattle
@@ -98,6 +106,7 @@ __all__ = [
     "hermite_fall_time",
     "inner",
     "kernel",
+    "kinks_per_second",
     "normal",
     "scenes",
     "step_impact",

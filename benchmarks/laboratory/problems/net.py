@@ -2,8 +2,8 @@
 
     python -m benchmarks.laboratory.problems.net
 
-writes data/net.npz: the motion by DOP853 (``benchmarks.spring_network``), to 1e-12, in parts that end where a bungee goes
-slack or taut. Its energy is kept to 3e-12 J of 300; with steps of a tenth it is the same to 3e-13 m.
+writes data/net.npz: the motion by DOP853 (``benchmarks.spring_network``), to 1e-12, in parts that end where a bungee
+goes slack or taut. Its energy is kept to 3e-12 J of 300; with steps of a tenth it is the same to 3e-13 m.
 """
 
 from __future__ import annotations
