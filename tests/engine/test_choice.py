@@ -142,3 +142,35 @@ def test_world_takes_a_tolerance() -> None:
 def test_senseless_settings_are_refused(setting: dict[str, float]) -> None:
     with pytest.raises(ValueError, match=r"choose_method: .* must be"):
         sy.choose_method(spring(), **{"tolerance": 1e-3, **setting})
+
+
+def test_kinks_are_counted() -> None:
+    scene = sy.Scene(gravity=(0.0, 0.0, 0.0))
+    ball = scene.add(sy.Particle(position=(0.0, 0.0, 0.0), velocity=(1.0, 0.0, 0.0), mass=2.0))
+    # Between bungees that begin to pull at 0.5 m to either side: half a period of pi sqrt(m/k) there, 1 s in between.
+    for end in (-1.0, 1.0):
+        scene.add(sy.AnchoredBungee(ball, (end, 0.0, 0.0), 2.0 * math.pi**2, 1.5))
+    assert sy.kinks_per_second(scene, 40.0) == pytest.approx(1.0, abs=0.05)
+    assert sy.kinks_per_second(spring(), 1.0) == 0.0
+
+
+def test_a_block_runs_as_often_as_its_worst_world_has_kinks() -> None:
+    resolving = next(c for c in sy.CANDIDATES if c.name == "RK4, kinks inside")
+    plain = next(c for c in sy.CANDIDATES if c.name == "RK4")
+    assert plain.runs(2.0) == resolving.runs(0.0) == 1.0
+    rng = np.random.default_rng(0)
+    for events in (0.05, 0.5, 3.0):
+        counts = rng.poisson(events, (100_000, 8)).max(axis=1)
+        turns = np.minimum(counts, resolving.integrator.divisions).mean()
+        assert resolving.runs(events) == pytest.approx(1.0 + 3.0 * turns, rel=0.02)
+
+
+@pytest.mark.parametrize("steps", [20, 23, 33, 44, 60])
+def test_any_number_of_steps_is_compared_with_the_reference(steps: int) -> None:
+    from steelyard import choice
+
+    whole = choice._whole(steps)
+    looks = choice._looks(whole)
+    assert steps <= whole <= 1.05 * steps
+    assert whole % looks == 0 and 20 <= looks < 40
+    assert choice._down(whole) == whole
