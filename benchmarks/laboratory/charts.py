@@ -95,11 +95,13 @@ def overview(measured: Measured, path: Path, *, title: str, note: str) -> None:
     handles.append(_handle(("#555555", "s", "--", False), "peers (see each problem's chart)"))
     figure.suptitle(title, x=0.01, y=1.0 - 0.15 / height, ha="left", va="top")
     figure.text(0.01, 0.08 / height, note, fontsize=8, color="#444444", va="bottom")
-    figure.tight_layout(rect=(0.0, 1.5 / height, 1.0, 1.0))
+    columns = 4
+    lines = -(-len(handles) // columns)
+    figure.tight_layout(rect=(0.0, (0.5 + 0.2 * lines) / height, 1.0, 1.0))
     figure.legend(
         handles=handles,
         loc="lower left",
-        ncols=4,
+        ncols=columns,
         fontsize=9,
         frameon=False,
         bbox_to_anchor=(0.005, 0.3 / height),

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import steelyard as sy
-from benchmarks.cloth import spring_motion
+from benchmarks.spring_network import SpringNetwork
 
 
 def test_what_the_cloth_is_made_of() -> None:
@@ -64,7 +64,7 @@ def test_a_stiffer_cloth_needs_more_passes(passes: int, holds: bool) -> None:
 
 def test_methods_converge_to_the_cloths_reference() -> None:
     scene = sy.scenes.cloth()
-    (exact,), _ = spring_motion(scene, np.array([0.25]))
+    (exact,), _ = SpringNetwork(scene).motion(np.array([0.25]))
 
     def error(integrator: Any, rate: int) -> float:
         world = sy.World(scene, method=sy.Method(integrator, dt=1.0 / rate))
