@@ -27,6 +27,14 @@ from .integrators.symplectic_euler import SymplecticEuler
 from .kernel import inner, kernel
 from .math.random import normal, uniform, uniform_between
 from .methods import Method
+from .scene.body import Body, BodyPoint
+from .scene.body_forces import (
+    AeroSurface,
+    AngledAeroSurface,
+    ControlledAeroSurface,
+    Thruster,
+    Wrench,
+)
 from .scene.contacts import Collisions, ContactGenerator, Ground, LinePlatform
 from .scene.forces import (
     AnchoredBungee,
@@ -43,6 +51,7 @@ from .scene.links import Cable, CableConstraint, Rod, RodConstraint
 from .scene.particle import Particle
 from .scene.rider import Rider
 from .scene.scene import Scene
+from .scene.shapes import Box, Capsule, Hollow, Part, Sphere
 from .solvers.direct import Direct
 from .solvers.gauss_seidel import GaussSeidel
 from .solvers.worst_first import WorstFirst
@@ -52,20 +61,27 @@ from .world import World
 
 __all__ = [
     "CANDIDATES",
+    "AeroSurface",
     "AnchoredBungee",
     "AnchoredSpring",
+    "AngledAeroSurface",
     "BackwardEuler",
+    "Body",
+    "BodyPoint",
+    "Box",
     "Bungee",
     "Buoyancy",
     "Cable",
     "CableConstraint",
     "Candidate",
+    "Capsule",
     "Choice",
     "ClosedForm",
     "Collisions",
     "ComposedRattle",
     "Considered",
     "ContactGenerator",
+    "ControlledAeroSurface",
     "Direct",
     "Drag",
     "ExplicitEuler",
@@ -74,12 +90,14 @@ __all__ = [
     "GeneralisedAlpha",
     "Gravity",
     "Ground",
+    "Hollow",
     "ImpactRattle",
     "ImplicitMidpoint",
     "KinkRungeKutta4",
     "LinePlatform",
     "LinearlyImplicit",
     "Method",
+    "Part",
     "Particle",
     "Rattle",
     "Rider",
@@ -87,12 +105,15 @@ __all__ = [
     "RodConstraint",
     "RungeKutta4",
     "Scene",
+    "Sphere",
     "Spring",
     "StiffSpring",
     "SymplecticEuler",
+    "Thruster",
     "UserForce",
     "World",
     "WorstFirst",
+    "Wrench",
     "Xpbd",
     "advance",
     "candidates",

@@ -15,7 +15,7 @@ from .scene.contacts import ContactGenerator
 from .scene.forces import Drag, StiffSpring, UserForce
 from .scene.links import Cable, CableConstraint
 from .scene.rider import Rider
-from .scene.scene import CONTACTS, FORCES, LINKS, Scene
+from .scene.scene import CONTACTS, FORCES, LINKS, SPRINGS, Scene
 from .solvers.base import Solver
 from .solvers.direct import Direct
 from .solvers.gauss_seidel import GaussSeidel
@@ -77,6 +77,20 @@ class Method:
         """
         name = type(self.integrator).__name__
         held = scene.of(*LINKS, *CONTACTS, Rider)
+        if scene.bodies and not self.integrator.moves_bodies:
+            raise ValueError(
+                f"{name} cannot step a Body; it steps particles. Use Rattle(), ComposedRattle() or RungeKutta4()."
+            )
+        if (
+            self.solver is not None
+            and self.solver.compliant
+            and scene.bodies
+            and scene.of(*SPRINGS)
+        ):
+            raise ValueError(
+                f"{type(self.solver).__name__} cannot hold a {type(scene.of(*SPRINGS)[0]).__name__} in a scene with "
+                "bodies, whose points it does not know. Use Rattle()."
+            )
         if isinstance(self.integrator, ClosedForm):
             other = held or scene.of(*FORCES)
             if other:

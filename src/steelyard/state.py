@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from .math.pointers import LANES
 from .model.compile import Model
-from .model.parameters import PARTICLES, Key
+from .model.derived import LOWER, symmetric
+from .model.parameters import BODIES, PARTICLES, Key
 from .scene import checks
+from .scene.body import Body
 from .scene.particle import Particle
+from .scene.shapes import rotation_matrix
 
 if TYPE_CHECKING:
     from .world import World
@@ -71,38 +74,52 @@ class Snapshot:
     values: dict[Key, np.ndarray]
 
 
-class Particles:
-    """All particles of all worlds."""
+class Group:
+    """All things of a kind, of all worlds: particles or bodies."""
 
     __slots__ = ("_world",)
+    key: ClassVar[str]
+    kind: ClassVar[type[Particle] | type[Body]]
 
     def __init__(self, world: World) -> None:
         self._world = world
 
-    def _vector(self, name: str) -> np.ndarray:
+    def _vector(self, name: str, width: int = 3) -> np.ndarray:
         world = self._world
-        row, size = world._model.places[PARTICLES, name]
+        if (self.key, name) not in world._model.places:
+            return np.zeros((world._worlds, 0, width))
+        row, size = world._model.places[self.key, name]
         rows = world._state[row : row + size, : world._worlds]
-        return rows.reshape(size // 3, 3, -1).transpose(2, 0, 1)
+        return rows.reshape(size // width, width, world._worlds).transpose(2, 0, 1)
+
+    @property
+    def _count(self) -> int:
+        return len(self._world.scene.of(self.kind))
+
+    def _parameter(self, name: str) -> np.ndarray:
+        return self._world._get((self.key, name))
+
+    def _assign(self, name: str, value: Any, width: int = 1) -> None:
+        self._world._set((self.key, name), value, width * self._count)
 
     @property
     def position(self) -> np.ndarray:
-        """Positions [m], a writable view of shape (worlds, particles, 3)."""
+        """Positions [m], of bodies of their centres of mass, a writable view of shape (worlds, things, 3)."""
         return self._vector("position")
 
     @property
     def velocity(self) -> np.ndarray:
-        """Velocities [m/s], a writable view of shape (worlds, particles, 3)."""
+        """Velocities [m/s], a writable view of shape (worlds, things, 3)."""
         return self._vector("velocity")
 
     @property
     def inverse_mass(self) -> np.ndarray:
-        """1/mass [1/kg], (particles,) if shared, (worlds, particles) if per world; assignable."""
-        return self._world._get((PARTICLES, "inverse_mass"))
+        """1/mass [1/kg], (things,) if shared, (worlds, things) if per world; assignable."""
+        return self._parameter("inverse_mass")
 
     @inverse_mass.setter
     def inverse_mass(self, value: Any) -> None:
-        self._world._set((PARTICLES, "inverse_mass"), value, self._count)
+        self._assign("inverse_mass", value)
 
     @property
     def mass(self) -> np.ndarray:
@@ -117,37 +134,165 @@ class Particles:
         world = self._world
         mass = checks.fitted("World", "mass", value, size=self._count, worlds=world.worlds)
         finite = np.where(mass == np.inf, 1.0, mass)  # inf is allowed here: it stays immovable
-        Particle.LIMITS["mass"].check("World", "mass", finite)
-        world._store((PARTICLES, "inverse_mass"), 1.0 / mass)
+        self.kind.LIMITS["mass"].check("World", "mass", finite)
+        world._store((self.key, "inverse_mass"), 1.0 / mass)
 
     @property
     def mass_or_zero(self) -> np.ndarray:
-        """Mass [kg], 0 where immovable, shape (worlds, particles)."""
+        """Mass [kg], 0 where immovable, shape (worlds, things)."""
         mass = self.mass
         mass = np.where(np.isfinite(mass), mass, 0.0)
         return np.broadcast_to(mass, (self._world.worlds, self._count))
 
     @property
     def damping(self) -> np.ndarray:
-        """Fraction of velocity kept per second, (particles,) or (worlds, particles); assignable."""
-        return self._world._get((PARTICLES, "damping"))
+        """Fraction of velocity kept per second, (things,) or (worlds, things); assignable."""
+        return self._parameter("damping")
 
     @damping.setter
     def damping(self, value: Any) -> None:
-        self._world._set((PARTICLES, "damping"), value, self._count)
+        self._assign("damping", value)
 
     @property
     def acceleration(self) -> np.ndarray:
-        """Constant accelerations [m/s^2], shape (worlds, particles, 3)."""
-        values = self._world._get((PARTICLES, "acceleration"))
+        """Constant accelerations [m/s^2], shape (worlds, things, 3)."""
+        values = self._parameter("acceleration")
         shape = (self._world.worlds, 3 * self._count)
-        each = np.broadcast_to(values, shape).reshape(-1, self._count, 3)
+        each = np.broadcast_to(values, shape).reshape(shape[0], self._count, 3)
         each.flags.writeable = False
         return each
 
+
+class Particles(Group):
+    """All particles of all worlds."""
+
+    __slots__ = ()
+    key, kind = PARTICLES, Particle
+
+
+class Bodies(Group):
+    """All bodies of all worlds."""
+
+    __slots__ = ()
+    key, kind = BODIES, Body
+
     @property
-    def _count(self) -> int:
-        return len(self._world.scene.particles)
+    def orientation(self) -> np.ndarray:
+        """Unit quaternions (w, x, y, z) that turn the body's axes into the world's, a view (worlds, bodies, 4).
+
+        It can be written into; what is written must be of length 1.
+        """
+        return self._vector("orientation", 4)
+
+    @property
+    def angular_momentum(self) -> np.ndarray:
+        """Angular momentum of each about its centre of mass [kg m^2/s] along the world's axes, (worlds, bodies, 3).
+
+        A writable view; it is what the state holds, so it stays where orientation or inertia are assigned.
+        """
+        return self._vector("angular_momentum")
+
+    @property
+    def angular_velocity(self) -> np.ndarray:
+        """Angular velocities [rad/s] along the world's axes, (worlds, bodies, 3), of orientation and momentum.
+
+        Assignable in this shape or (bodies, 3): assign it after orientation and inertia.
+        """
+        turn = rotation_matrix(self.orientation)
+        movable = np.array([body.movable for body in self._world.scene.bodies])
+        inertia = np.where(movable[:, None, None], self.inertia, np.eye(3))
+        own = np.linalg.solve(
+            inertia, np.einsum("wbji,wbj->wbi", turn, self.angular_momentum)[..., None]
+        )
+        velocity = np.einsum("wbij,wbj->wbi", turn, own[..., 0])
+        velocity.flags.writeable = False  # a write would be lost
+        return velocity
+
+    @angular_velocity.setter
+    def angular_velocity(self, value: Any) -> None:
+        world = self._world
+        size = 3 * self._count
+        given = checks.floats(value)
+        flat = value if given is None else given.reshape(*given.shape[:-2], -1)
+        spin = checks.fitted("World", "angular_velocity", flat, size=size, worlds=world.worlds)
+        checks.FINITE.check("World", "angular_velocity", spin)
+        spin = np.moveaxis(spin.reshape(self._count, 3, -1), -1, 0)
+        turn = rotation_matrix(self.orientation)
+        spin = np.broadcast_to(spin, turn.shape[:-1])
+        own = np.einsum("wbji,wbj->wbi", turn, spin)
+        own = np.einsum("wbij,wbj->wbi", self.inertia, own)
+        self.angular_momentum[:] = np.einsum("wbij,wbj->wbi", turn, own)
+
+    @property
+    def angular_damping(self) -> np.ndarray:
+        """Fraction of angular velocity kept per second, (bodies,) or (worlds, bodies); assignable."""
+        return self._parameter("angular_damping")
+
+    @angular_damping.setter
+    def angular_damping(self, value: Any) -> None:
+        self._assign("angular_damping", value)
+
+    @property
+    def inertia(self) -> np.ndarray:
+        """Inertia [kg m^2] about the centre of mass along the body's axes, shape (worlds, bodies, 3, 3).
+
+        Assignable in shape (bodies, 3, 3) or (worlds, bodies, 3, 3).
+        """
+        values = self._parameter("inertia")
+        shape = (self._world.worlds, 6 * self._count)
+        each = np.broadcast_to(values, shape).reshape(shape[0], self._count, 6)
+        matrix = symmetric(np.moveaxis(each, -1, 0))
+        matrix.flags.writeable = False  # a write would be lost
+        return matrix
+
+    @inertia.setter
+    def inertia(self, value: Any) -> None:
+        world = self._world
+        given = checks.floats(value)
+        shape = (self._count, 3, 3)
+        if given is None or given.shape not in (shape, (world.worlds, *shape)):
+            raise ValueError(
+                f"World: inertia is {checks.described(value)}; it must be of shape {shape} for all worlds, or of shape "
+                f"{(world.worlds, *shape)} for each its own. Give matrices."
+            )
+        if not np.array_equal(given, np.swapaxes(given, -1, -2)):
+            raise ValueError("World: inertia is not symmetric; it must be. Give (A + A^T)/2.")
+        numbers = given[..., LOWER[0], LOWER[1]]
+        self._assign("inertia", numbers.reshape(*numbers.shape[:-2], -1), 6)
+
+
+def strike(
+    world: World,
+    body: Body,
+    impulse: Any,
+    *,
+    at: Any = None,
+    angular: bool = False,
+    mask: Any = None,
+) -> None:
+    """See ``World.apply_impulse`` and ``apply_angular_impulse``."""
+    if body not in world.scene:
+        raise KeyError("World: this body is not in the world's scene; add it.")
+    if not body.movable:
+        raise ValueError(
+            "World: an impulse on an immovable body; its inverse mass is 0 and must be above 0. Give it a mass."
+        )
+    worlds, k = world.worlds, world._index(body)
+    blow = checks.fitted("World", "impulse", impulse, size=3, worlds=worlds).reshape(3, -1).T
+    checks.FINITE.check("World", "impulse", blow.T)
+    chosen = np.ones(worlds, dtype=bool)
+    if mask is not None:
+        chosen = checks.mask("World.apply_impulse", mask, worlds=worlds)
+    bodies = world.bodies
+    moment = blow
+    if not angular:
+        change = blow / bodies.mass_or_zero[:, k, None]
+        bodies.velocity[chosen, k] += change[chosen]
+        moment = np.zeros((1, 3))
+        if at is not None:
+            place = checks.fitted("World", "at", at, size=3, worlds=worlds).reshape(3, -1).T
+            moment = np.cross(place - bodies.position[:, k], blow)
+    bodies.angular_momentum[chosen, k] += np.broadcast_to(moment, (worlds, 3))[chosen]
 
 
 def assigned(key: Key, value: Any, *, size: int, worlds: int) -> np.ndarray:
@@ -157,7 +302,9 @@ def assigned(key: Key, value: Any, *, size: int, worlds: int) -> np.ndarray:
         ValueError: of another shape, not finite or out of its limits.
     """
     thing, name = key
-    kind, owner = (Particle, "World") if thing == PARTICLES else (type(thing), type(thing).__name__)
+    kinds: dict[str, Any] = {PARTICLES: Particle, BODIES: Body}
+    own = isinstance(thing, str)
+    kind, owner = (kinds[thing], "World") if own else (type(thing), type(thing).__name__)
     given = checks.fitted(owner, name, value, size=size, worlds=worlds)
     return kind.LIMITS.get(name, checks.FINITE).check(owner, name, given)
 
@@ -204,8 +351,9 @@ class Handle:
 
     def _unknown(self, name: str) -> str:
         kind = type(self._thing).__name__
-        if isinstance(self._thing, Particle):
-            return f"{kind} has no {name!r} in a world; use world.particles for all of them."
+        if isinstance(self._thing, Particle | Body):
+            plural = "particles" if isinstance(self._thing, Particle) else "bodies"
+            return f"{kind} has no {name!r} in a world; use world.{plural} for all of them."
         model = self._world.model
         keys = [*model.places, *model.parameters.values]
         # Rows of single pairs have names with a number, and are no one's business.
@@ -214,47 +362,67 @@ class Handle:
 
 
 def follow_gravity(model: Model) -> None:
-    """Give the assigned gravity to all particles that bring no acceleration of their own."""
+    """Give the assigned gravity to all particles and bodies that bring no acceleration of their own."""
     values = model.parameters.values
-    gravity, own = values[PARTICLES, "gravity"], values[PARTICLES, "acceleration"]
-    if max(gravity.ndim, own.ndim) == 2:
-        gravity, own = gravity.reshape(3, -1), own.reshape(len(own), -1)
-        own = np.repeat(own, max(gravity.shape[1], own.shape[1]) // own.shape[1], axis=1)
-    own = own.copy()
-    for p, particle in enumerate(model.scene.particles):
-        if particle.acceleration is None:
-            own[3 * p : 3 * p + 3] = gravity
-    values[PARTICLES, "acceleration"] = own
+    for key, things in _groups(model).items():
+        if (key, "acceleration") in values:
+            gravity, own = values[PARTICLES, "gravity"], values[key, "acceleration"]
+            if max(gravity.ndim, own.ndim) == 2:
+                gravity, own = gravity.reshape(3, -1), own.reshape(len(own), -1)
+                worlds = max(gravity.shape[1], own.shape[1])
+                own = np.broadcast_to(own, (len(own), worlds))
+            own = own.copy()
+            for p, thing in enumerate(things):
+                if thing.acceleration is None:
+                    own[3 * p : 3 * p + 3] = gravity
+            values[key, "acceleration"] = own
+
+
+def _groups(model: Model) -> dict[str, list[Any]]:
+    """Particles and bodies by the key of their state."""
+    return {PARTICLES: model.scene.particles, BODIES: model.scene.bodies}
 
 
 def carry(old: Model, old_state: np.ndarray, new: Model, state: np.ndarray) -> None:
-    """Copy what both models hold: things by identity, particles by identity."""
-    before = {id(p): k for k, p in enumerate(old.scene.particles)}
+    """Copy what both models hold: things by identity, those of groups too."""
+    groups = _groups(new)
+    before = {
+        key: {id(thing): k for k, thing in enumerate(things)}
+        for key, things in _groups(old).items()
+    }
     for key, (row, size) in new.places.items():
         thing, name = key
-        if thing == PARTICLES and name in ("position", "velocity", "user"):
-            if key in old.places:
-                for p, particle in enumerate(new.scene.particles):
-                    if id(particle) in before:
-                        source = old.places[key][0] + 3 * before[id(particle)]
-                        state[row + 3 * p : row + 3 * p + 3] = old_state[source : source + 3]
-        elif name != "mark" and key in old.places and old.places[key][1] == size:
-            source = old.places[key][0]
+        if key not in old.places or name == "mark":
+            continue
+        source = old.places[key][0]
+        if thing in groups and name in _EACH:
+            width = size // len(groups[thing]) if groups[thing] else 0
+            for k, member in enumerate(groups[thing]):
+                if id(member) in before[thing]:
+                    at = source + width * before[thing][id(member)]
+                    state[row + width * k : row + width * (k + 1)] = old_state[at : at + width]
+        elif old.places[key][1] == size:
             state[row : row + size] = old_state[source : source + size]
     for key, value in old.parameters.values.items():
         present = new.parameters.values.get(key)
         if present is None:
             continue
-        if key[0] == PARTICLES and key[1] != "gravity":
-            _carry_particles(old, new, before, key, value)
+        if key[0] in groups and key[1] != "gravity":
+            _carry_each(old, new, groups[key[0]], before[key[0]], key, value)
         elif present.shape[0] == value.shape[0]:
             new.parameters.values[key] = value
 
 
-def _carry_particles(
-    old: Model, new: Model, before: dict[int, int], key: Key, value: np.ndarray
+#: Parts of the state of which every particle or body has its own.
+_EACH = ("position", "velocity", "user", "orientation", "angular_momentum")
+
+
+def _carry_each(
+    old: Model, new: Model, things: list[Any], before: dict[int, int], key: Key, value: np.ndarray
 ) -> None:
-    """Copy a parameter of particles that both models hold; new ones take the assigned gravity."""
+    """Copy a parameter of particles or bodies that both models hold; new ones take the assigned gravity."""
+    if not before or not things:
+        return
     width = value.shape[0] // len(before)
     present = new.parameters.values[key]
     gravity = old.parameters.values[PARTICLES, "gravity"]
@@ -263,11 +431,11 @@ def _carry_particles(
         present = np.repeat(present[:, None], worlds, axis=1)
         value = np.broadcast_to(value.reshape(len(value), -1), (len(value), worlds))
         gravity = np.broadcast_to(gravity.reshape(3, -1), (3, worlds))
-    for p, particle in enumerate(new.scene.particles):
+    for p, thing in enumerate(things):
         target = slice(width * p, width * p + width)
-        if id(particle) in before:
-            source = width * before[id(particle)]
+        if id(thing) in before:
+            source = width * before[id(thing)]
             present[target] = value[source : source + width]
-        elif key[1] == "acceleration" and particle.acceleration is None:
+        elif key[1] == "acceleration" and thing.acceleration is None:
             present[target] = gravity
     new.parameters.values[key] = present

@@ -15,14 +15,16 @@ from .diagnostics.residual import link_residuals
 from .math.pointers import LANES
 from .methods import DEFAULT, Method
 from .model.compile import Model, compile_model
-from .model.parameters import PARTICLES, Key
-from .model.tape import H_DAMPED
+from .model.parameters import BODIES, PARTICLES, Key
+from .model.tape import H_BODIES_DAMPED, H_DAMPED
 from .scene import checks
+from .scene.body import Body
 from .scene.contacts import ContactGenerator
 from .scene.forces import UserForce
 from .scene.particle import Particle
 from .scene.scene import Scene
 from .state import (
+    Bodies,
     Handle,
     Particles,
     Snapshot,
@@ -31,6 +33,7 @@ from .state import (
     follow_gravity,
     new_scratch,
     new_state,
+    strike,
 )
 from .stepping import WHOLE_STEP, advance_blocks, launch, start_again
 from .written import evaluate_forces, generate_contacts
@@ -176,6 +179,44 @@ class World:
         """Positions, velocities and parameters of all particles."""
         return Particles(self)
 
+    @property
+    def bodies(self) -> Bodies:
+        """Positions, orientations, velocities and parameters of all bodies."""
+        return Bodies(self)
+
+    def apply_impulse(
+        self, body: Body, impulse: Any, *, at: Any = None, mask: np.ndarray | None = None
+    ) -> None:
+        """Change a body's velocities at once, as by a blow.
+
+        Args:
+            body: a movable body of the scene.
+            impulse: [N s], (3,) or (worlds, 3), along the world's axes.
+            at: where [m], (3,) or (worlds, 3), in the world; the centre of mass by default.
+            mask: (worlds,) bool, those that get it; all by default.
+
+        Raises:
+            KeyError: the body is not in the scene.
+            ValueError: it is immovable, or an array of another shape.
+        """
+        strike(self, body, impulse, at=at, mask=mask)
+
+    def apply_angular_impulse(
+        self, body: Body, impulse: Any, *, mask: np.ndarray | None = None
+    ) -> None:
+        """Change a body's angular velocity at once, as by a couple of blows.
+
+        Args:
+            body: a movable body of the scene.
+            impulse: [N m s], (3,) or (worlds, 3), along the world's axes.
+            mask: (worlds,) bool, those that get it; all by default.
+
+        Raises:
+            KeyError: the body is not in the scene.
+            ValueError: it is immovable, or an array of another shape.
+        """
+        strike(self, body, impulse, angular=True, mask=mask)
+
     def __getitem__(self, thing: Any) -> Handle:
         """What can be read or assigned of a link, rider, contact generator or force.
 
@@ -251,10 +292,11 @@ class World:
         """First row in ``state`` of a part of it.
 
         Args:
-            thing: "particles", or a link, rider or generator of the scene.
-            name: "position" (3 rows per particle), "velocity", "time", "nonfinite"; "length",
-                "rate" or "acceleration" of a winch; "weights", "rates" or "accelerations" of a
-                rider.
+            thing: "particles", "bodies", or a link, rider, generator or force of the scene.
+            name: "position" (3 rows per particle or body), "velocity", of bodies also "orientation" (4 rows) and
+                "angular_momentum" (3); "time", "nonfinite" of particles; "length", "rate" or "acceleration" of a
+                winch; "weights", "rates" or "accelerations" of a rider; "force" and "torque" of a wrench;
+                "throttle" of a thruster; "control" of a surface.
         """
         return self.model.places[thing, name][0]
 
@@ -294,14 +336,22 @@ class World:
 
     @property
     def momentum(self) -> np.ndarray:
-        """Linear momentum [kg m/s] of the movable particles, shape (worlds, 3)."""
-        return np.einsum("wp,wpc->wc", self.particles.mass_or_zero, self.particles.velocity)
+        """Linear momentum [kg m/s] of the movable particles and bodies, shape (worlds, 3)."""
+        total = np.einsum("wp,wpc->wc", self.particles.mass_or_zero, self.particles.velocity)
+        if self.scene.bodies:
+            total += np.einsum("wb,wbc->wc", self.bodies.mass_or_zero, self.bodies.velocity)
+        return total
 
     @property
     def angular_momentum(self) -> np.ndarray:
         """Angular momentum [kg m^2/s] about the origin, shape (worlds, 3)."""
         moment = np.cross(self.particles.position, self.particles.velocity)
-        return np.einsum("wp,wpc->wc", self.particles.mass_or_zero, moment)
+        total = np.einsum("wp,wpc->wc", self.particles.mass_or_zero, moment)
+        if self.scene.bodies:
+            moment = np.cross(self.bodies.position, self.bodies.velocity)
+            total += np.einsum("wb,wbc->wc", self.bodies.mass_or_zero, moment)
+            total += self.bodies.angular_momentum.sum(axis=1)
+        return total
 
     @property
     def residual(self) -> np.ndarray:
@@ -394,6 +444,9 @@ class World:
         """Lay out what follows from the parameters."""
         damping = self.model.parameters.values[PARTICLES, "damping"]
         self.model.tape[H_DAMPED] = int((damping != 1.0).any())
+        if self.scene.bodies:
+            kept = [self.model.parameters.values[BODIES, n] for n in ("damping", "angular_damping")]
+            self.model.tape[H_BODIES_DAMPED] = int(any((value != 1.0).any() for value in kept))
         shared, self._given, self._given_rows = self.model.parameters.rows(self._state.shape[1])
         for scratch, *_ in self._scratch:
             for row, value in shared:
@@ -405,8 +458,9 @@ class World:
         ]
         self._stale = False
 
-    def _index(self, particle: Particle) -> int:
-        return next(p for p, other in enumerate(self.scene.particles) if other is particle)
+    def _index(self, thing: Particle | Body) -> int:
+        group = self.scene.of(type(thing))
+        return next(k for k, other in enumerate(group) if other is thing)
 
     def _view(self, thing: Any, name: str) -> np.ndarray:
         row, size = self._model.places[thing, name]
@@ -423,7 +477,9 @@ class World:
     def _store(self, key: Key, value: np.ndarray) -> None:
         if self.scene.planar and key[1] in checks.VECTORS:
             thing = key[0]
-            checks.in_plane("World" if thing == PARTICLES else type(thing).__name__, key[1], value)
+            checks.in_plane(
+                "World" if isinstance(thing, str) else type(thing).__name__, key[1], value
+            )
         check = self.model.parameters.checks.get(key)
         if check is not None:
             check(value)

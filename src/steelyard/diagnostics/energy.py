@@ -2,30 +2,37 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..scene.body import Body
 from ..scene.forces import (
     AnchoredBungee,
-    AnchoredSpring,
     Bungee,
     Buoyancy,
     Gravity,
-    Spring,
     StiffSpring,
     UserForce,
 )
-from .spans import spans, values
+from ..scene.scene import SPRINGS
+from .spans import place_of, spans, values
 
 if TYPE_CHECKING:
+    from ..scene.particle import Particle
+    from ..state import Bodies, Particles
     from ..world import World
 
 
 def kinetic_energy(world: World) -> np.ndarray:
-    """Sum of m v^2 / 2 [J], shape (worlds,)."""
+    """Sum of m v^2 / 2 of particles, and of that and w.L / 2 of bodies [J], shape (worlds,)."""
     speed = (world.particles.velocity**2).sum(axis=2)
-    return 0.5 * (world.particles.mass_or_zero * speed).sum(axis=1)
+    total = 0.5 * (world.particles.mass_or_zero * speed).sum(axis=1)
+    if world.scene.bodies:
+        bodies = world.bodies
+        total = total + 0.5 * (bodies.mass_or_zero * (bodies.velocity**2).sum(axis=2)).sum(axis=1)
+        total = total + 0.5 * (bodies.angular_velocity * bodies.angular_momentum).sum(axis=(1, 2))
+    return total
 
 
 def potential_energy(world: World) -> np.ndarray:
@@ -36,22 +43,33 @@ def potential_energy(world: World) -> np.ndarray:
     particles = world.particles
     height = (particles.acceleration * particles.position).sum(axis=2)
     total = _springs(world) - (particles.mass_or_zero * height).sum(axis=1)
+    if world.scene.bodies:
+        bodies = world.bodies
+        height = (bodies.acceleration * bodies.position).sum(axis=2)
+        total = total - (bodies.mass_or_zero * height).sum(axis=1)
     for force in world.scene.of(Buoyancy, Gravity, UserForce):
         if isinstance(force, Buoyancy):
             total = total + _buoyancy(world, force)
         elif isinstance(force, Gravity):
-            chosen = world.scene.particles if force.particles is None else force.particles
-            for p in map(world._index, chosen):
-                along = (world[force].acceleration * particles.position[:, p]).sum(axis=-1)
-                total = total - particles.mass_or_zero[:, p] * along
+            everything: list[Any] = [*world.scene.particles, *world.scene.bodies]
+            for thing in everything if force.particles is None else force.particles:
+                group = bodies_or_particles(world, thing)
+                k = world._index(thing)
+                along = (world[force].acceleration * group.position[:, k]).sum(axis=-1)
+                total = total - group.mass_or_zero[:, k] * along
         else:
             total = total + force.potential(particles.position)
     return total
 
 
+def bodies_or_particles(world: World, thing: Particle | Body) -> Bodies | Particles:
+    """What holds the state of a particle or body."""
+    return world.bodies if isinstance(thing, Body) else world.particles
+
+
 def _springs(world: World) -> np.ndarray:
     """k (l - l0)^2 / 2 of all springs; of a bungee only where it is stretched."""
-    springs = world.scene.of(Spring, Bungee, AnchoredSpring, AnchoredBungee, StiffSpring)
+    springs = world.scene.of(*SPRINGS)
     if not springs:
         return np.zeros(world.worlds)
     stretch = np.linalg.norm(spans(world, springs), axis=2)
@@ -66,7 +84,7 @@ def _springs(world: World) -> np.ndarray:
 def _buoyancy(world: World, force: Buoyancy) -> np.ndarray:
     """Minus the integral of the lift from high above down to the float."""
     handle = world[force]
-    y = world.particles.position[:, world._index(force.particle), 1]
+    y = place_of(world, force.particle)[:, 1]
     lift = handle.volume * handle.density * handle.gravity
     half = handle.half_depth
     depth = handle.surface + half - y

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..scene.forces import AnchoredBungee, Bungee, Buoyancy
-from .spans import spans, values
+from .spans import place_of, spans, values
 
 if TYPE_CHECKING:
     from ..world import World
@@ -26,6 +26,6 @@ def kink_sides(world: World) -> np.ndarray:
         sides.append(length > values(world, bungees, "rest_length"))
     for force in world.scene.of(Buoyancy):
         handle = world[force]
-        depth = handle.surface - world.particles.position[:, world._index(force.particle), 1]
+        depth = handle.surface - place_of(world, force.particle)[:, 1]
         sides += [(depth > -handle.half_depth)[:, None], (depth > handle.half_depth)[:, None]]
     return np.concatenate(sides, axis=1)

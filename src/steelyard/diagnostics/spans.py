@@ -7,7 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..scene.body import BodyPoint
+from ..scene.shapes import rotation_matrix
+
 if TYPE_CHECKING:
+    from ..scene.particle import Particle
     from ..world import World
 
 
@@ -23,7 +27,14 @@ def spans(world: World, things: Sequence[Any]) -> np.ndarray:
     """From the second end to the first [m], shape (worlds, things, 3)."""
     place = {id(particle): p for p, particle in enumerate(world.scene.particles)}
     position = world.particles.position
-    first = [place[id(thing.a if hasattr(thing, "a") else thing.particle)] for thing in things]
+    ends = [thing.a if hasattr(thing, "a") else thing.particle for thing in things]
+    ends += [thing.b for thing in things if hasattr(thing, "b")]
+    points = {id(end): end for end in ends if isinstance(end, BodyPoint)}
+    if points:
+        place |= {key: len(place) + k for k, key in enumerate(points)}
+        placed = [place_of(world, point)[:, None] for point in points.values()]
+        position = np.concatenate([position, *placed], axis=1)
+    first = [place[id(end)] for end in ends[: len(things)]]
     second = np.empty((world.worlds, len(things), 3))
     for k, thing in enumerate(things):
         if not hasattr(thing, "b"):
@@ -31,6 +42,15 @@ def spans(world: World, things: Sequence[Any]) -> np.ndarray:
     joined = [k for k, thing in enumerate(things) if hasattr(thing, "b")]
     second[:, joined] = position[:, [place[id(things[k].b)] for k in joined]]
     return np.asarray(position[:, first] - second)
+
+
+def place_of(world: World, end: Particle | BodyPoint) -> np.ndarray:
+    """Position of a particle or of a point of a body [m], shape (worlds, 3)."""
+    k = world._index(end.body if isinstance(end, BodyPoint) else end)
+    if not isinstance(end, BodyPoint):
+        return world.particles.position[:, k]
+    turn = rotation_matrix(world.bodies.orientation[:, k])
+    return np.asarray(world.bodies.position[:, k] + turn @ np.array(end.place))
 
 
 def _value(world: World, thing: Any, name: str) -> np.ndarray:

@@ -9,6 +9,9 @@ from ..math.lanes import any_lane, load, splat, store
 from ..math.pointers import axes
 from ..model.tape import H_ACTIVE, H_FORCE, H_FORCED, H_PARTICLES, H_USER_FORCES
 from ..stage import stage
+from .aero import add_surfaces
+from .applied import add_applied, add_thrusts
+from .body_points import clear_wrenches, gather_points, place_points
 from .buoyancy import add_buoyancy
 from .drag import add_drag
 from .gravity import add_gravity
@@ -48,6 +51,22 @@ def accumulate_forces(tape, s):
 
 
 @stage
+def load_bodies(tape, s, skip, part):
+    """Clear the wrenches on bodies and place their points; ``sum_forces`` follows."""
+    clear_wrenches(tape, s)
+    place_points(tape, s)
+    add_thrusts(tape, s)
+    add_surfaces(tape, s)
+
+
+@stage
+def gather_bodies(tape, s, skip, part):
+    """What all forces come to on bodies, after ``sum_forces``."""
+    gather_points(tape, s)
+    add_applied(tape, s)
+
+
+@stage
 def sum_forces(tape, s, skip, part):
     """All forces at the state at hand, drag too; nothing where no world is active."""
     if any_lane(load(s, tape[H_ACTIVE]) > splat(0.5)):
@@ -56,12 +75,21 @@ def sum_forces(tape, s, skip, part):
 
 
 @cache
-def acting_forces(springs, gravities, buoyancies, written):
-    """``accumulate_forces`` for the declared kinds alone, which costs what they cost."""
+def acting_forces(acting):
+    """``accumulate_forces`` for the declared kinds alone (``integrators.base.Acting``), which costs what they cost."""
+    springs, gravities, buoyancies, written = acting[:4]
+    particles_forced = acting.particles_forced
+    points, wrenches, applied = acting.points, acting.wrenches, acting.applied
+    thrusts, surfaces = acting.thrusts, acting.surfaces
 
     @inner
     def accumulate(tape, s):
-        clear_forces(tape, s)
+        if wrenches:
+            clear_wrenches(tape, s)
+        if points:
+            place_points(tape, s)
+        if particles_forced:
+            clear_forces(tape, s)
         if springs:
             add_springs(tape, s)
         if gravities:
@@ -70,5 +98,13 @@ def acting_forces(springs, gravities, buoyancies, written):
             add_buoyancy(tape, s)
         if written:
             add_written_forces(tape, s)
+        if thrusts:
+            add_thrusts(tape, s)
+        if surfaces:
+            add_surfaces(tape, s)
+        if points:
+            gather_points(tape, s)
+        if applied:
+            add_applied(tape, s)
 
     return accumulate

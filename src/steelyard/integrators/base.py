@@ -20,11 +20,22 @@ class Acting(NamedTuple):
     written: bool = False
     drags: bool = False
     stiff_springs: bool = False
+    bodies: bool = False
+    points: bool = False
+    wrenches: bool = False
+    applied: bool = False
+    thrusts: bool = False
+    surfaces: bool = False
+
+    @property
+    def particles_forced(self) -> bool:
+        """Whether any is a force whose rows are those of particles."""
+        return self.springs or self.gravities or self.buoyancies or self.written
 
     @property
     def summed(self) -> bool:
         """Whether any is a force that is summed."""
-        return self.springs or self.gravities or self.buoyancies or self.written
+        return self.particles_forced or self.wrenches
 
 
 @dataclass(frozen=True)
@@ -47,8 +58,11 @@ class Integrator:
     evaluations: ClassVar[tuple[float | None, ...]] = (0.0,)
     #: Share of the step by which implicit methods reach ahead: their matrix is M - r D - r^2 K with r = reach dt.
     reach: ClassVar[float] = 0.0
-    #: Scratch rows per particle that it works in.
+    #: Scratch rows per particle that it works in, and per body.
     work: ClassVar[int] = 0
+    body_work: ClassVar[int] = 0
+    #: Whether it moves rigid bodies.
+    moves_bodies: ClassVar[bool] = False
     #: Whether it works with a solver of displacements and velocities (True), of impulses (False).
     solver_stages: ClassVar[tuple[bool, ...]] = ()
 

@@ -28,13 +28,17 @@ from typing import ClassVar
 from ..constraints.controls import move_controls
 from ..math.lanes import load, store
 from ..model.tape import (
+    BODY,
     FRESH,
     H_BLOCKS,
+    H_BODIES,
+    H_BODIES_DAMPED,
     H_DAMPED,
     H_DAMPING,
     H_DT,
     H_PARTICLES,
     H_SUBSTEPS,
+    SUBSTEP,
 )
 from ..scene import checks
 from ..solvers.base import Solver
@@ -86,6 +90,7 @@ class ComposedRattle(Integrator):
     evaluations: ClassVar[tuple[float | None, ...]] = ()
     solver_stages: ClassVar[tuple[bool, ...]] = (True,)
     reverses: ClassVar[bool] = True
+    moves_bodies: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         checks.whole("ComposedRattle", "substeps", self.substeps, least=1, remedy="Use 5.")
@@ -127,11 +132,17 @@ def begin_substep(tape, s, skip, part):
 
     The position stage starts from the impulses of the last one, which grow with the square of the length.
     """
-    record = tape[H_SUBSTEPS] + 1 + 3 * (part - _HALVES)
+    record = tape[H_SUBSTEPS] + 1 + SUBSTEP * (part - _HALVES)
     store(s, tape[H_DT], load(s, tape[record]))
     if tape[H_DAMPED] != 0:
         for p in range(tape[H_PARTICLES]):
             store(s, tape[H_DAMPING] + p, load(s, tape[record + 1] + p))
+    if tape[H_BODIES_DAMPED] != 0:
+        at = tape[H_BODIES]
+        for index in range(tape[at]):
+            row = tape[at + 1 + BODY * index + 9]
+            for k in range(2):
+                store(s, row + k, load(s, tape[record + 3] + 2 * index + k))
     scale_multipliers(tape, s, load(s, tape[record + 2]))
     if part > _HALVES:
         # The factor at hand is that of the substep before, where this one begins.
@@ -141,4 +152,4 @@ def begin_substep(tape, s, skip, part):
 @stage
 def end_substeps(tape, s, skip, half):
     """The clock goes by the whole step."""
-    store(s, tape[H_DT], load(s, tape[tape[H_SUBSTEPS] + 1 + 3 * tape[tape[H_SUBSTEPS]]]))
+    store(s, tape[H_DT], load(s, tape[tape[H_SUBSTEPS] + 1 + SUBSTEP * tape[tape[H_SUBSTEPS]]]))

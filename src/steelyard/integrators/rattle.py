@@ -4,7 +4,8 @@
     kick h/2, damp h/2, velocity stage (gradients of the step's end).
 
 Order 2, symplectic and time-reversible without damping and contacts; a spring is stable while h w < 2, with
-phase error (h w)^2/24 per radian. Damping and drag are exact flows of half a step on either side. Impacts
+phase error (h w)^2/24 per radian. Bodies are kicked alike and turn freely in between (``integrators.rotor``): without
+torque their motion is exact to rounding. Damping and drag are exact flows of half a step on either side. Impacts
 are resolved to the step (order 1 in their time), after Capobianco, Harsch, Eugster & Leine (2021).
 """
 
@@ -25,6 +26,7 @@ from ..solvers.stages import begin_step
 from ..stage import Stage, stage
 from .base import Acting, Integrator, Recipe
 from .motion import damp, drift, kick
+from .rotor import damp_bodies, drift_bodies, flag_nonfinite_bodies, kick_bodies
 
 
 @dataclass(frozen=True)
@@ -34,6 +36,7 @@ class Rattle(Integrator):
     damping_share: ClassVar[float] = 0.5
     evaluations: ClassVar[tuple[float | None, ...]] = (0.0, 1.0)
     solver_stages: ClassVar[tuple[bool, ...]] = (True,)
+    moves_bodies: ClassVar[bool] = True
 
     def recipe(self, solver: Solver | None, acting: Acting) -> Recipe:
         """Both halves, each followed by its stage of the constraints."""
@@ -62,15 +65,20 @@ class Rattle(Integrator):
 def rattle_halves(acting: Acting) -> tuple[Stage, Stage]:
     """Both halves for the forces of a scene: up to the drift, and from the new positions on."""
     summed, drags, stiff_springs = acting.summed, acting.drags, acting.stiff_springs
-    accumulate = acting_forces(*acting[:4])
+    bodies, loaded, surfaces = acting.bodies, acting.wrenches, acting.surfaces
+    accumulate = acting_forces(acting)
 
     @stage
     def rattle_first_half(tape, s, skip, half):
         """The position stage follows."""
         dt = load(s, tape[H_DT])
         # Forces of place alone are those that the step before ended with.
-        if summed and skip[tape[H_BLOCKS] + FRESH] != 0:
+        if summed and (surfaces or skip[tape[H_BLOCKS] + FRESH] != 0):
             accumulate(tape, s)
+        if bodies:
+            damp_bodies(tape, s)
+            kick_bodies(tape, s, splat(0.5) * dt, loaded)
+            drift_bodies(tape, s, dt)
         damp(tape, s)
         if drags:
             flow_drag(tape, s, False)
@@ -85,6 +93,10 @@ def rattle_halves(acting: Acting) -> tuple[Stage, Stage]:
         if summed:
             accumulate(tape, s)
         kick(tape, s, splat(0.5) * load(s, tape[H_DT]))
+        if bodies:
+            kick_bodies(tape, s, splat(0.5) * load(s, tape[H_DT]), loaded)
+            damp_bodies(tape, s)
+            flag_nonfinite_bodies(tape, s)
         if drags:
             flow_drag(tape, s, True)
         damp(tape, s)

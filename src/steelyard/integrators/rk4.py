@@ -18,11 +18,22 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
-from ..forces.accumulate import sum_forces
+from ..forces.accumulate import gather_bodies, load_bodies, sum_forces
+from ..kernel import inner
 from ..math.lanes import fma, load, splat, store
 from ..math.pointers import axes
+from ..math.rotations import (
+    in_frame,
+    load_quaternion,
+    load_turn,
+    quaternion_product,
+    store_unit_quaternion,
+)
+from ..math.vectors import load_vector
 from ..model.tape import (
+    BODY,
     H_ACCELERATION,
+    H_BODIES,
     H_DAMPED,
     H_DAMPING,
     H_DT,
@@ -35,8 +46,9 @@ from ..model.tape import (
     H_WORK,
 )
 from ..solvers.base import Solver
-from ..stage import stage
+from ..stage import Stage, stage
 from .base import Acting, Integrator, Recipe
+from .rotor import flag_nonfinite_bodies
 
 
 @dataclass(frozen=True)
@@ -47,10 +59,16 @@ class RungeKutta4(Integrator):
     smooth: ClassVar[bool] = True
     evaluations: ClassVar[tuple[float | None, ...]] = (0.0, 0.5, 0.5, 1.0)
     work: ClassVar[int] = 12
+    body_work: ClassVar[int] = 26
+    moves_bodies: ClassVar[bool] = True
 
     def recipe(self, solver: Solver | None, acting: Acting) -> Recipe:
         """Four evaluations, each with its part of the sum."""
-        return tuple((each, part) for part in range(4) for each in (sum_forces, rk4_part))
+        around: tuple[Stage, ...] = (sum_forces,)
+        if acting.wrenches:
+            around = (load_bodies, sum_forces, gather_bodies)
+        steps = (rk4_part, rk4_bodies_part) if acting.bodies else (rk4_part,)
+        return tuple((each, part) for part in range(4) for each in (*around, *steps))
 
     def order(self) -> int:
         """Fourth order."""
@@ -59,6 +77,27 @@ class RungeKutta4(Integrator):
     def stable_limit(self) -> float:
         """Stable while dt times angular frequency is below 2 sqrt 2."""
         return 2.0 * math.sqrt(2.0)
+
+
+@inner
+def _advance_row(s, part, weight, reach, row, start, total, rate):
+    """One number of the state, from its rate at the state at hand; ``start`` and ``total`` are its work rows."""
+    if part == 0:
+        store(s, start, load(s, row))
+        store(s, total, rate)
+    else:
+        sum_ = fma(weight, rate, load(s, total))
+        store(s, total, sum_)
+        if part == 3:
+            rate = sum_
+    store(s, row, fma(reach, rate, load(s, start)))
+
+
+@inner
+def _advance_vector(s, part, weight, reach, row, start, total, x, y, z):
+    _advance_row(s, part, weight, reach, row, start, total, x)
+    _advance_row(s, part, weight, reach, row + 1, start + 1, total + 1, y)
+    _advance_row(s, part, weight, reach, row + 2, start + 2, total + 2, z)
 
 
 @stage
@@ -77,27 +116,72 @@ def rk4_part(tape, s, skip, part):
         inverse = load(s, tape[H_INVERSE_MASS] + p)
         for component in range(axes(s)):
             row = 3 * p + component
-            x = load(s, tape[H_POSITION] + row)
             v = load(s, tape[H_VELOCITY] + row)
             a = load(s, tape[H_ACCELERATION] + row)
             if tape[H_FORCED] != 0:
                 a = fma(inverse, load(s, tape[H_FORCE] + row), a)
             if tape[H_DAMPED] != 0:
                 a = fma(splat(0.0) - load(s, tape[H_DAMPING] + p), v, a)
-            rate_x = v
-            rate_v = a
-            if part == 0:
-                store(s, start + row, x)
-                store(s, start + count + row, v)
-                store(s, total + row, v)
-                store(s, total + count + row, a)
-            else:
-                sum_x = fma(weight, v, load(s, total + row))
-                sum_v = fma(weight, a, load(s, total + count + row))
-                store(s, total + row, sum_x)
-                store(s, total + count + row, sum_v)
-                if part == 3:
-                    rate_x = sum_x
-                    rate_v = sum_v
-            store(s, tape[H_POSITION] + row, fma(reach, rate_x, load(s, start + row)))
-            store(s, tape[H_VELOCITY] + row, fma(reach, rate_v, load(s, start + count + row)))
+            place = tape[H_POSITION] + row
+            _advance_row(s, part, weight, reach, place, start + row, total + row, v)
+            place = tape[H_VELOCITY] + row
+            row += count
+            _advance_row(s, part, weight, reach, place, start + row, total + row, a)
+
+
+@stage
+def rk4_bodies_part(tape, s, skip, part):
+    """The same for bodies: x' = v, q' = (0, w) q/2, v' = a + F/m - c v, L' = torque - c L.
+
+    Work rows: the thirteen numbers of the state at the step's start, then the sums of their rates. Quaternions are of
+    length 1 again at the step's end alone.
+    """
+    dt = load(s, tape[H_DT])
+    zero = splat(0.0)
+    half = splat(0.5)
+    weight = splat(1.0 if part == 0 or part == 3 else 2.0)
+    reach = dt * splat(1.0 / 6.0 if part == 3 else 1.0 if part == 2 else 0.5)
+    at = tape[H_BODIES]
+    for index in range(tape[at]):
+        body = at + 1 + BODY * index
+        start = tape[body + 10]
+        total = start + 13
+        turn = tape[body + 1]
+        f, w, x, y, z = load_turn(s, turn)
+        vx, vy, vz = load_vector(s, tape[body + 2])
+        lx, ly, lz = load_vector(s, tape[body + 3])
+        ox, oy, oz = in_frame(s, tape[body + 7], f, w, x, y, z, lx, ly, lz)
+        wrench = tape[body + 4]
+        push = load(s, tape[body + 5])
+        qw, qx, qy, qz = quaternion_product(zero, ox, oy, oz, w, x, y, z)
+        brake = zero - load(s, tape[body + 9])
+        fx, fy, fz = load_vector(s, wrench)
+        ax, ay, az = load_vector(s, tape[body + 8])
+        ax = fma(brake, vx, fma(push, fx, ax))
+        ay = fma(brake, vy, fma(push, fy, ay))
+        az = fma(brake, vz, fma(push, fz, az))
+        brake = zero - load(s, tape[body + 9] + 1)
+        rx, ry, rz = load_vector(s, wrench + 3)
+        rx = fma(brake, lx, rx)
+        ry = fma(brake, ly, ry)
+        rz = fma(brake, lz, rz)
+        _advance_vector(s, part, weight, reach, tape[body], start, total, vx, vy, vz)
+        _advance_vector(s, part, weight, reach, tape[body + 2], start + 3, total + 3, ax, ay, az)
+        _advance_vector(s, part, weight, reach, tape[body + 3], start + 6, total + 6, rx, ry, rz)
+        _advance_row(s, part, weight, reach, turn, start + 9, total + 9, half * qw)
+        _advance_vector(
+            s,
+            part,
+            weight,
+            reach,
+            turn + 1,
+            start + 10,
+            total + 10,
+            half * qx,
+            half * qy,
+            half * qz,
+        )
+        if part == 3:
+            store_unit_quaternion(s, turn, *load_quaternion(s, turn))
+    if part == 3:
+        flag_nonfinite_bodies(tape, s)

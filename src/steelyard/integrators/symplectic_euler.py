@@ -1,7 +1,8 @@
 """Symplectic Euler: v += h a, then x += h v with the new velocity.
 
 Order 1 in the positions. Conserves a nearby energy; a spring is stable while h w < 2. Damping and drag act
-by their exact flow before the kick.
+by their exact flow before the kick. Bodies take their gyroscopic term implicitly, by one step of Newton's method (Catto
+2015), and turn by the new angular velocity; this loses angular momentum and energy at first order, and is stable.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from ..solvers.stages import begin_step
 from ..stage import Stage, stage
 from .base import Acting, Integrator, Recipe
 from .motion import damp, drift, kick
+from .rotor import damp_bodies, flag_nonfinite_bodies, kick_bodies, turn_implicitly
 
 
 @dataclass(frozen=True)
@@ -28,6 +30,7 @@ class SymplecticEuler(Integrator):
     """Semi-implicit Euler (see the module)."""
 
     solver_stages: ClassVar[tuple[bool, ...]] = (True, False)
+    moves_bodies: ClassVar[bool] = True
 
     def recipe(self, solver: Solver | None, acting: Acting) -> Recipe:
         """Damp, kick and drift, then the constraints."""
@@ -57,13 +60,19 @@ class SymplecticEuler(Integrator):
 def symplectic_euler_step(acting: Acting) -> Stage:
     """Damp, kick and drift under the forces of a scene; constraints follow."""
     summed, drags, stiff_springs = acting.summed, acting.drags, acting.stiff_springs
-    accumulate = acting_forces(*acting[:4])
+    bodies, loaded = acting.bodies, acting.wrenches
+    accumulate = acting_forces(acting)
 
     @stage
     def symplectic_euler_step(tape, s, skip, half):
         dt = load(s, tape[H_DT])
         if summed:
             accumulate(tape, s)
+        if bodies:
+            damp_bodies(tape, s)
+            kick_bodies(tape, s, dt, loaded)
+            turn_implicitly(tape, s, dt)
+            flag_nonfinite_bodies(tape, s)
         damp(tape, s)
         if drags:
             flow_drag(tape, s, False)

@@ -11,6 +11,7 @@ from ..forces.springs import ONE_SIDED
 from ..integrators.base import Acting, Recipe
 from ..math.pointers import LANES
 from ..methods import Method
+from ..scene.body import Body, BodyPoint
 from ..scene.contacts import Collisions, ContactGenerator
 from ..scene.forces import StiffSpring, UserForce
 from ..scene.links import Cable, CableConstraint
@@ -18,6 +19,7 @@ from ..scene.particle import Particle
 from ..scene.rider import Rider
 from ..scene.scene import CONTACTS, LINKS, Scene
 from . import derived, tape
+from .bodies import Bodies
 from .compliances import add_compliances
 from .constraints import add_contacts, add_links, add_riders
 from .forces import add_forces
@@ -26,7 +28,18 @@ from .parameters import PARTICLES, Key, Parameters, Slot
 from .propagators import add_propagators
 from .saddle import Saddle
 from .stiffness import Stiffness
-from .tape import COMPLIANCE, CONTACT, EVENT, HEADER, KINK, KINK_ROWS, LINK
+from .tape import (
+    BODY,
+    BODY_POINT,
+    COMPLIANCE,
+    CONTACT,
+    EVENT,
+    HEADER,
+    KINK,
+    KINK_ROWS,
+    LINK,
+    WRENCHED,
+)
 
 #: Header fields that are -1, not an empty section, where a scene has no such rows.
 _ABSENT = ("user_forces", "force", "start", "free", "impulse", "dense")
@@ -79,6 +92,7 @@ class Compiler:
         self.parameters = self.model.parameters
         self.particles = scene.particles
         self.index = {id(particle): p for p, particle in enumerate(self.particles)}
+        self.bodies = Bodies(self)
         self.links = scene.of(*LINKS)
         self.riders = scene.of(Rider)
         self.contacts = self._contact_pairs()
@@ -93,6 +107,7 @@ class Compiler:
             "springs": 7, "gravities": 3, "buoyancies": 5, "drags": 7, "stiff_springs": 8, "drift": 1,
             "winches": 3, "movers": 5, "links": LINK, "contacts": CONTACT, "generators": 2,
             "recipe": 2, "unknowns": 4, "spring_blocks": 4, "drag_blocks": 1, "float_blocks": 1,
+            "bodies": BODY, "points": BODY_POINT, "wrenched": WRENCHED, "applied": 2, "thrusts": 5, "surfaces": 8,
             "propagators": 2, "parts": 2, "compliances": COMPLIANCE, "kinks": KINK,
         }  # fmt: skip
         self.next_row = 0
@@ -153,9 +168,13 @@ class Compiler:
         """Index of a particle."""
         return self.index[id(particle)]
 
-    def at(self, name: str, particle: Particle) -> int:
-        """First row of a vector of a particle."""
-        return self.header[name] + 3 * self.of(particle)
+    def at(self, name: str, end: Particle | BodyPoint | Body) -> int:
+        """First row of a vector of a particle or of a body's point, or of the force through a body's centre."""
+        if isinstance(end, BodyPoint):
+            return self.bodies.point(name, end)
+        if isinstance(end, Body):
+            return self.bodies.wrench(end)
+        return self.header[name] + 3 * self.of(end)
 
     # Parts
 
@@ -182,6 +201,7 @@ class Compiler:
         header["particles"] = count
         header["position"] = self.state((PARTICLES, "position"), [p.position for p in particles])
         header["velocity"] = self.state((PARTICLES, "velocity"), [p.velocity for p in particles])
+        self.bodies.state()
         self._controls()
         self._multipliers()
         user = self.scene.of(UserForce)
@@ -202,11 +222,13 @@ class Compiler:
         self.minus_one = self.constant(-1.0)
         self._particles()
         add_forces(self)
+        self.bodies.forces()
         self._events()
         add_links(self)
         add_compliances(self)
         add_riders(self)
         add_contacts(self)
+        self.bodies.finish()
         self._method()
         self._network()
         self._write()
@@ -350,12 +372,14 @@ class Compiler:
             )
             for part in set(fractions)
         }
+        turned = {part: self.bodies.powers(part * share) for part in set(fractions)}
         records: list[int] = []
         for part, before in zip(fractions, (fractions[-1], *fractions), strict=False):
             records += [
                 self.constant(part * self.method.dt),
                 kept[part],
                 self.constant((part / before) ** 2),
+                turned[part],
             ]
         self.sections["substeps"] = [*records, self.constant(self.method.dt)]
         self.counts["substeps"] = len(fractions)
@@ -375,6 +399,12 @@ class Compiler:
             written=self.header["user_forces"] >= 0,
             drags=bool(sections["drags"]),
             stiff_springs=bool(sections["stiff_springs"]),
+            bodies=bool(sections.get("bodies")),
+            points=bool(sections.get("points")),
+            wrenches=bool(sections.get("wrenched")),
+            applied=bool(sections["applied"]),
+            thrusts=bool(sections["thrusts"]),
+            surfaces=bool(sections["surfaces"]),
         )
 
     def some(self, chosen: Any) -> list[Particle]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from ..scene.forces import AnchoredBungee, AnchoredSpring, Bungee, Spring
+from ..scene.particle import Particle
 from ..scene.scene import Scene
 
 if TYPE_CHECKING:
@@ -24,10 +25,13 @@ def add_compliances(c: Compiler) -> None:
         rest = c.parameter(spring, "rest_length", spring.rest_length)
         if isinstance(spring, AnchoredSpring):
             a = spring.particle
+            assert isinstance(a, Particle)
             anchor = c.parameter(spring, "anchor", spring.anchor)
             b, fb, wb = anchor, c.header["impulse"] + 3 * len(c.particles), c.zero
         else:
             a, other = spring.a, spring.b
+            # Points of bodies are refused with a compliant solver.
+            assert isinstance(a, Particle) and isinstance(other, Particle)
             b, fb = c.at("position", other), c.at("impulse", other)
             wb = c.header["inverse_mass"] + c.of(other)
         records += [

@@ -10,6 +10,9 @@ import numpy as np
 
 _Extended = np.longdouble
 
+#: Where the six numbers of a symmetric matrix stand in it.
+LOWER = ([0, 1, 1, 2, 2, 2], [0, 0, 1, 0, 1, 2])
+
 
 def decay(damping: np.ndarray, time: float) -> np.ndarray:
     """damping^time."""
@@ -19,6 +22,19 @@ def decay(damping: np.ndarray, time: float) -> np.ndarray:
 def rate(damping: np.ndarray) -> np.ndarray:
     """-ln(damping), which is 0, not -0, for no damping."""
     return np.abs(np.log(damping))
+
+
+def symmetric(numbers: np.ndarray) -> np.ndarray:
+    """Matrices (..., 3, 3) from their numbers 00 10 11 20 21 22 along the first axis, (6, ...)."""
+    a, b, c, d, e, f = numbers
+    rows = [np.stack(row, axis=-1) for row in ((a, b, d), (b, c, e), (d, e, f))]
+    return np.stack(rows, axis=-2)
+
+
+def inverse_inertia(numbers: np.ndarray) -> np.ndarray:
+    """Inverse of a symmetric matrix, in and out as numbers 00 10 11 20 21 22, (6,) or (6, worlds)."""
+    inverse = np.linalg.inv(symmetric(numbers))
+    return np.stack([inverse[..., i, j] for i, j in zip(*LOWER, strict=True)])
 
 
 def flight(damping: np.ndarray, time: float) -> np.ndarray:

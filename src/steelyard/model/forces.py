@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..forces.springs import ONE_SIDED, REST_ALONE, TWO_SIDED
+from ..scene.body import Body, BodyPoint
 from ..scene.forces import (
     AnchoredBungee,
     AnchoredSpring,
@@ -29,8 +30,8 @@ if TYPE_CHECKING:
 _PLAIN = ("anchor", "stiffness", "damping")
 
 
-def _movable(c: Compiler, particle: Particle) -> int | None:
-    return c.of(particle) if particle.movable else None
+def _movable(c: Compiler, end: Particle | BodyPoint) -> int | None:
+    return c.of(end) if isinstance(end, Particle) and end.movable else None
 
 
 def add_forces(c: Compiler) -> None:
@@ -65,9 +66,11 @@ def add_forces(c: Compiler) -> None:
         kind = TWO_SIDED
         if isinstance(spring, Bungee | AnchoredBungee):
             kind = ONE_SIDED
-        elif isinstance(spring, AnchoredSpring) and integrator.linear and a.movable:
-            kind = REST_ALONE
-            c.linear.setdefault(c.of(a), []).append((spring, None, True))
+        elif isinstance(spring, AnchoredSpring) and integrator.linear:
+            index = _movable(c, a)
+            if index is not None:
+                kind = REST_ALONE
+                c.linear.setdefault(index, []).append((spring, None, True))
         springs += [
             c.at("position", a),
             b,
@@ -88,8 +91,10 @@ def add_forces(c: Compiler) -> None:
         masses = c.slot(len(c.particles), ((PARTICLES, "inverse_mass"),), mass)
         for gravity in gravities:
             g = c.parameter(gravity, "acceleration", gravity.acceleration)
-            for p in c.some(gravity.particles):
-                c.sections["gravities"] += [c.at("force", p), masses + c.of(p), g]
+            chosen: list[Any] = [*c.particles, *c.bodies.bodies]
+            for p in chosen if gravity.particles is None else gravity.particles:
+                mass_row = c.bodies.mass(p) if isinstance(p, Body) else masses + c.of(p)
+                c.sections["gravities"] += [c.at("force", p), mass_row, g]
     c.sections["buoyancies"] = []
     for float_ in scene.of(Buoyancy):
         names = ("volume", "density", "gravity")

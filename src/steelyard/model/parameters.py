@@ -16,6 +16,8 @@ import numpy as np
 
 #: The thing under which all particles' state and parameters are kept.
 PARTICLES = "particles"
+#: And all bodies'.
+BODIES = "bodies"
 
 Key = tuple[Any, str]
 

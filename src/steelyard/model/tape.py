@@ -106,14 +106,28 @@ from __future__ import annotations
     H_TRIAL,
     H_DAMPING_RATES,
     H_KINKS,
-) = range(97)
-HEADER = 97
+    H_BODIES,
+    H_BODIES_DAMPED,
+    H_ROTOR,
+    H_POINTS,
+    H_WRENCHED,
+    H_APPLIED,
+    H_THRUSTS,
+    H_SURFACES,
+) = range(105)
+HEADER = 105
 
 # Width of the records of links, contacts and springs that a solver holds; written field by field.
 LINK = 17
 CONTACT = 24
 SADDLE_LINK = 10
 COMPLIANCE = 10
+# Records of a movable body: rows of position, orientation, velocity, angular momentum, wrench, inverse mass, inertia,
+# its inverse, acceleration, damping, and work rows; and of a point of a body (``forces.body_points``).
+BODY, BODY_POINT, WRENCHED = 11, 9, 5
+# Record of a substep of a composition: its length, what damping keeps of particles, growth of impulses, and what it
+# keeps of bodies.
+SUBSTEP = 4
 # Work rows of a contact or cable whose impact is resolved inside the step.
 EVENT = 15
 # Record of a kink whose time is resolved: its kind, the row of what moves, the other end's and the length's, or the

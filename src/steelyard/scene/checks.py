@@ -239,6 +239,24 @@ def vector(owner: str, name: str, value: Any) -> tuple[float, float, float]:
     return x, y, z
 
 
+def quaternion(owner: str, name: str, value: Any) -> tuple[float, float, float, float]:
+    """``value`` as a unit quaternion (w, x, y, z).
+
+    Raises:
+        ValueError: not four finite numbers, or all of them 0.
+    """
+    given = floats(value)
+    if given is None or given.shape != (4,) or not np.isfinite(given).all() or not given.any():
+        raise ValueError(
+            f"{owner}: {name} is {value!r}; it must be four finite numbers (w, x, y, z), not all 0. Use "
+            "(1, 0, 0, 0) for no turn, or (cos a/2, sin a/2 times the axis) for one by a."
+        )
+    w, x, y, z = (
+        given / np.linalg.norm(given / np.abs(given).max()) / np.abs(given).max()
+    ).tolist()
+    return w, x, y, z
+
+
 #: Names under which things hold vectors.
 VECTORS = (
     "position", "velocity", "acceleration", "gravity", "anchor", "normal", "start", "end", "wind",

@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from . import checks
+from .body import Body, BodyPoint
 from .particle import Particle, check_ends, check_particles
 
 _STIFFNESS = checks.Limit(above=0.0, remedy="Give newtons per metre of stretch.")
@@ -22,23 +23,23 @@ _POSITIVE = checks.Limit(above=0.0)
 
 @dataclass(eq=False)
 class Gravity:
-    """F = m g on each of its particles; immovable ones feel nothing.
+    """F = m g on each of its particles and bodies; immovable ones feel nothing.
 
     Source: Millington, *Game Physics Engine Development*, ch. 5.
 
     Args:
         acceleration: g [m/s^2], added to what the scene's gravity gives.
-        particles: those it acts on; all of the scene by default.
+        particles: particles and bodies that it acts on; all of the scene by default.
     """
 
     acceleration: checks.Vector
-    particles: Sequence[Particle] | None = None
+    particles: Sequence[Particle | Body] | None = None
 
     LIMITS: ClassVar[dict[str, checks.Rule]] = {}
 
     def __post_init__(self) -> None:
         checks.vectors(self, "acceleration")
-        check_particles(self, "particles")
+        check_particles(self, "particles", others=(Body,))
 
 
 @dataclass(eq=False)
@@ -70,21 +71,21 @@ class Spring:
     """F = -k (l - l0) n on ``a``, the opposite on ``b``; n points from b to a.
 
     Args:
-        a: one end.
+        a: one end: a particle, or a point of a body (``body.at(...)``).
         b: the other end.
         stiffness: k [N/m], above 0.
         rest_length: l0 [m], at least 0.
     """
 
-    a: Particle
-    b: Particle
+    a: Particle | BodyPoint
+    b: Particle | BodyPoint
     stiffness: float
     rest_length: float
 
     LIMITS: ClassVar = _SPRING
 
     def __post_init__(self) -> None:
-        check_ends(self, "a", "b")
+        check_ends(self, "a", "b", others=(BodyPoint,))
         checks.numbers(self, "stiffness", "rest_length")
 
 
@@ -98,13 +99,13 @@ class AnchoredSpring:
     """F = -k (l - l0) n, n from the anchor to the particle.
 
     Args:
-        particle: the moving end.
+        particle: the moving end: a particle, or a point of a body (``body.at(...)``).
         anchor: the fixed end [m]; may be assigned between steps.
         stiffness: k [N/m], above 0.
         rest_length: l0 [m], at least 0.
     """
 
-    particle: Particle
+    particle: Particle | BodyPoint
     anchor: checks.Vector
     stiffness: float
     rest_length: float
@@ -112,7 +113,7 @@ class AnchoredSpring:
     LIMITS: ClassVar = _SPRING
 
     def __post_init__(self) -> None:
-        check_ends(self, "particle")
+        check_ends(self, "particle", others=(BodyPoint,))
         checks.vectors(self, "anchor")
         checks.numbers(self, "stiffness", "rest_length")
 
@@ -159,7 +160,7 @@ class Buoyancy:
     F_y = rho V g (h + d - y) / (2 d) for y in [h - d, h + d].
 
     Args:
-        particle: the float.
+        particle: the float: a particle, or a point of a body (``body.at(...)``).
         surface: h, height of the surface [m].
         half_depth: d [m], above 0: the float is wholly under at y = h - d.
         volume: V [m^3], above 0.
@@ -167,7 +168,7 @@ class Buoyancy:
         gravity: g [m/s^2], above 0.
     """
 
-    particle: Particle
+    particle: Particle | BodyPoint
     surface: float
     half_depth: float
     volume: float
@@ -183,7 +184,7 @@ class Buoyancy:
     }
 
     def __post_init__(self) -> None:
-        check_ends(self, "particle")
+        check_ends(self, "particle", others=(BodyPoint,))
         checks.numbers(self, *self.LIMITS)
 
 

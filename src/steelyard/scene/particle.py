@@ -79,29 +79,30 @@ class Particle:
         return bool(self.inverse_mass)
 
 
-def check_ends(thing: Any, *names: str) -> None:
-    """Make sure that attributes of a thing are particles, each another.
+def check_ends(thing: Any, *names: str, others: tuple[type, ...] = ()) -> None:
+    """Make sure that attributes of a thing are particles, or of other kinds that will do, each another.
 
     Raises:
-        TypeError: one is no particle.
+        TypeError: one is neither.
         ValueError: two are the same.
     """
     owner = type(thing).__name__
     ends = [getattr(thing, name) for name in names]
     for name, end in zip(names, ends, strict=True):
-        if not isinstance(end, Particle):
-            raise TypeError(f"{owner}: {name} is {end!r}; it must be a Particle. Give one.")
+        if not isinstance(end, (Particle, *others)):
+            kinds = " or ".join(kind.__name__ for kind in (Particle, *others))
+            raise TypeError(f"{owner}: {name} is {end!r}; it must be a {kinds}. Give one.")
     if len(set(map(id, ends))) < len(ends):
         raise ValueError(
             f"{owner}: {' and '.join(names)} are the same particle; it needs two. Give another."
         )
 
 
-def check_particles(thing: Any, name: str) -> None:
+def check_particles(thing: Any, name: str, *, others: tuple[type, ...] = ()) -> None:
     """Make an attribute of a thing a tuple of different particles; None, for all, stays.
 
     Raises:
-        TypeError: not a sequence of particles.
+        TypeError: not a sequence of particles, or of other kinds that will do.
         ValueError: a particle is in it twice.
     """
     owner = type(thing).__name__
@@ -112,7 +113,7 @@ def check_particles(thing: Any, name: str) -> None:
         chosen = tuple(value)
     except TypeError:
         chosen = (None,)
-    if not all(isinstance(particle, Particle) for particle in chosen):
+    if not all(isinstance(particle, (Particle, *others)) for particle in chosen):
         raise TypeError(
             f"{owner}: {name} is {value!r}; it must be a list of Particles. Put even one in a list."
         )

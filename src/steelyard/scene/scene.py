@@ -8,6 +8,8 @@ from typing import Any, TypeVar
 import numpy as np
 
 from . import checks
+from .body import Body, BodyPoint
+from .body_forces import BODY_FORCES
 from .contacts import Collisions, ContactGenerator, Ground, LinePlatform, check_thickness
 from .forces import (
     AnchoredBungee,
@@ -26,6 +28,7 @@ from .rider import Rider
 
 LINKS = (Rod, RodConstraint, Cable, CableConstraint)
 CONTACTS = (Ground, LinePlatform, Collisions, ContactGenerator)
+SPRINGS = (Spring, Bungee, AnchoredSpring, AnchoredBungee, StiffSpring)
 FORCES = (
     Gravity,
     Drag,
@@ -37,16 +40,17 @@ FORCES = (
     Buoyancy,
     UserForce,
 )
-KINDS = (Particle, Rider, *LINKS, *CONTACTS, *FORCES)
+KINDS = (Particle, Body, Rider, *LINKS, *CONTACTS, *FORCES, *BODY_FORCES)
 
 Thing = TypeVar("Thing")
 
 
-def members(thing: Any) -> Iterator[Particle]:
-    """The particles that a link, rider, contact generator or force refers to."""
-    for name in ("a", "b", "particle"):
+def members(thing: Any) -> Iterator[Particle | Body]:
+    """The particles and bodies that a link, rider, contact generator or force refers to."""
+    for name in ("a", "b", "particle", "point", "body"):
         if hasattr(thing, name):
-            yield getattr(thing, name)
+            end = getattr(thing, name)
+            yield end.body if isinstance(end, BodyPoint) else end
     yield from getattr(thing, "particles", None) or ()
     yield from getattr(thing, "deck", ())
     for pair in getattr(thing, "pairs", ()):
@@ -54,10 +58,10 @@ def members(thing: Any) -> Iterator[Particle]:
 
 
 class Scene:
-    """Particles and everything that acts on them, in the order in which they were added.
+    """Particles, bodies and everything that acts on them, in the order in which they were added.
 
     Args:
-        gravity: acceleration [m/s^2] of every particle that does not bring its own.
+        gravity: acceleration [m/s^2] of every particle and body that does not bring its own.
         planar: all that it holds lies and moves in the plane z = 0, and kernels step two coordinates instead of three;
             arrays keep the third, which stepping neither reads nor changes: leave it 0, as the energy counts it.
 
@@ -80,7 +84,7 @@ class Scene:
         return 2 if self.planar else 3
 
     def add(self, thing: Thing) -> Thing:
-        """Add a particle, link, rider, contact generator or force, and return it.
+        """Add a particle, body, link, rider, contact generator or force, and return it.
 
         Raises:
             TypeError: not something that a scene holds.
@@ -95,11 +99,12 @@ class Scene:
             )
         if thing in self:
             raise ValueError(f"Scene.add: this {name} is already in the scene; add another one.")
-        for particle in members(thing):
-            if particle not in self:
+        for member in members(thing):
+            if member not in self:
+                kind = type(member).__name__.lower()
                 raise ValueError(
-                    f"Scene.add: this {name} refers to a particle at {particle.position} that is "
-                    "not in this scene; both must belong to the same scene. Add the particle first."
+                    f"Scene.add: this {name} refers to a {kind} at {member.position} that is "
+                    f"not in this scene; both must belong to the same scene. Add the {kind} first."
                 )
         if isinstance(thing, StiffSpring) and any(
             force.particle is thing.particle for force in self.of(StiffSpring)
@@ -108,6 +113,11 @@ class Scene:
                 f"Scene.add: the particle at {thing.particle.position} has a StiffSpring already; "
                 "the limit is 1 per particle, since its solution is exact only alone. Use "
                 "AnchoredSpring."
+            )
+        if self.planar and isinstance(thing, Body):
+            raise ValueError(
+                "Scene.add: a Body cannot be in a planar scene, which steps two coordinates; a body turns in three. "
+                "Use a Scene that is not planar."
             )
         if self.planar:
             for vector in checks.VECTORS:
@@ -131,8 +141,8 @@ class Scene:
         for other in self.things:
             if other is not thing and any(particle is thing for particle in members(other)):
                 raise ValueError(
-                    f"Scene.remove: a {type(other).__name__} still refers to this particle; remove "
-                    "that first."
+                    f"Scene.remove: a {type(other).__name__} still refers to this {type(thing).__name__.lower()}; "
+                    "remove that first."
                 )
         self.things = [other for other in self.things if other is not thing]
 
@@ -140,18 +150,27 @@ class Scene:
         """The particles that a link, rider or contact generator may push."""
         if isinstance(thing, Ground | LinePlatform | Collisions) and thing.particles is None:
             return [particle for particle in self.particles if particle.movable]
-        return list(members(thing))
+        return [member for member in members(thing) if isinstance(member, Particle)]
 
     def check(self) -> None:
         """Make sure that worlds of this scene mean something.
 
         Raises:
-            ValueError: no particle, a line platform that one of its particles can never touch, or collisions of none.
+            ValueError: neither particle nor body, a line platform that one of its particles can never touch, collisions
+                of none, or contacts of everything in a scene with bodies.
         """
-        if not self.particles:
+        if not self.particles and not self.bodies:
             raise ValueError(
-                "Scene: the scene has 0 particles; it must have at least 1. Add a Particle."
+                "Scene: the scene has 0 particles; it must have at least 1, or a body. Add a Particle."
             )
+        if any(body.movable for body in self.bodies):
+            for contact in self.of(Ground, LinePlatform, Collisions):
+                if contact.particles is None:
+                    name = type(contact).__name__
+                    raise ValueError(
+                        f"Scene: a {name} for all of a scene with bodies; it meets particles alone so far, and bodies "
+                        f"would pass through it unseen. Name the particles: {name}(particles=[...])."
+                    )
         for line in self.of(LinePlatform):
             check_thickness(line.radius, self.touched(line))
         for collisions in self.of(Collisions):
@@ -171,6 +190,11 @@ class Scene:
     def particles(self) -> list[Particle]:
         """All particles, in the order they were added: the order of every particle axis."""
         return self.of(Particle)
+
+    @property
+    def bodies(self) -> list[Body]:
+        """All bodies, in the order they were added: the order of every body axis."""
+        return self.of(Body)
 
     def __contains__(self, thing: object) -> bool:
         return any(other is thing for other in self.things)
