@@ -11,6 +11,7 @@ from .integrators.rattle import Rattle
 from .integrators.rk4 import RungeKutta4
 from .integrators.symplectic_euler import SymplecticEuler
 from .scene import checks
+from .scene.body_forces import SURFACES
 from .scene.contacts import ContactGenerator
 from .scene.forces import Drag, StiffSpring, UserForce
 from .scene.links import Cable, CableConstraint
@@ -187,7 +188,7 @@ class Method:
     @staticmethod
     def _refuse_backwards(name: str, scene: Scene) -> None:
         """Raise if a scene holds what cannot run backwards in time."""
-        for thing in scene.of(Cable, CableConstraint, *CONTACTS, Drag, StiffSpring):
+        for thing in scene.of(Cable, CableConstraint, *CONTACTS, Drag, StiffSpring, *SURFACES):
             raise ValueError(
                 f"{name} cannot step a {type(thing).__name__}: parts of its step run backwards in time, where "
                 "impacts and drag have no meaning. Use Rattle(), or rods and AnchoredSpring."

@@ -365,7 +365,7 @@ def follow_gravity(model: Model) -> None:
     """Give the assigned gravity to all particles and bodies that bring no acceleration of their own."""
     values = model.parameters.values
     for key, things in _groups(model).items():
-        if (key, "acceleration") in values:
+        if things:
             gravity, own = values[PARTICLES, "gravity"], values[key, "acceleration"]
             if max(gravity.ndim, own.ndim) == 2:
                 gravity, own = gravity.reshape(3, -1), own.reshape(len(own), -1)
