@@ -25,9 +25,11 @@ from benchmarks.laboratory.problems import (
     collision,
     net,
     projectile,
+    top,
 )
 from benchmarks.moving_load import taut_motion
 from benchmarks.spring_network import SpringNetwork
+from tests.elliptic import elliptic_spin
 
 Array = np.ndarray
 
@@ -262,6 +264,39 @@ def test_net_keeps_its_energy_and_is_met_by_order_four() -> None:
         world.step(steps * len(net.LOOKS))
         distance.append(np.abs(world.particles.position[0] - stored.position[-1]).max())
     assert distance[1] < 2e-6 and distance[0] / distance[1] > 10.0
+
+
+def test_free_top_is_the_elliptic_solution_and_keeps_its_momentum() -> None:
+    true = top.stored("free")
+    turn = true.position[:, 1:]  # its rows are the body's axes
+    spin = 0.5 * np.cross(turn, true.velocity[:, 1:]).sum(axis=1)
+    own = np.einsum("tkc,tc->tk", turn, spin)
+    for time, found in zip(top.STRETCH * np.array(top.LOOKS), own, strict=True):
+        exact = elliptic_spin(np.array(top.SPIN), time)
+        np.testing.assert_allclose(found, exact, rtol=0, atol=1e-13)
+    momentum = np.einsum("tkc,tk->tc", turn, own * top.INERTIA)
+    start = np.array(top.SPIN) * top.INERTIA
+    np.testing.assert_allclose(momentum, np.broadcast_to(start, momentum.shape), rtol=0, atol=1e-10)
+
+
+def test_heavy_top_by_order_six_and_by_its_three_constants() -> None:
+    true = top.stored("heavy")
+    turn = true.position[:, 1:]
+    spin = 0.5 * np.cross(turn, true.velocity[:, 1:]).sum(axis=1)
+    first = top.ACROSS + top.MASS * top.ARM**2
+    momentum = np.einsum(
+        "tkc,tk->tc", turn, np.einsum("tkc,tc->tk", turn, spin) * [first, top.ALONG, first]
+    )
+    # What is left of the momentum: along the axis, and along the vertical.
+    np.testing.assert_allclose(
+        np.einsum("tc,tc->t", momentum, turn[:, 1]), top.ALONG * top.RATE, rtol=1e-12
+    )
+    np.testing.assert_allclose(
+        momentum[:, 1], top.ALONG * top.RATE * math.cos(top.TILT), rtol=1e-12
+    )
+    world = sy.World(top.heavy_top(), method=sy.Method(sy.ComposedRattle(9), dt=1.0 / 480.0))
+    world.step(4_800)
+    np.testing.assert_allclose(sy.landmarks(world)[0][0], true.position[-1], rtol=0, atol=1e-10)
 
 
 def test_projectile_without_drag_is_the_limit_of_little_drag() -> None:

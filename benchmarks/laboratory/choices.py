@@ -135,8 +135,8 @@ def score(problem: Problem, method: sy.Method) -> float:
                 return math.inf
             if stretches * hit in problem.looks:
                 look = problem.looks.index(stretches * hit)
-                motion.position[look] = world.particles.position[0]
-                motion.velocity[look] = world.particles.velocity[0]
+                places, speeds = sy.landmarks(world)
+                motion.position[look], motion.velocity[look] = places[0], speeds[0]
     except BrokenRunError:
         return math.inf
     return worst(problem.errors(motion))

@@ -3,9 +3,9 @@
     python -m benchmarks.laboratory.costs
 
 Reads what ``make charts`` measured and writes src/steelyard/costs.json. Kernels work through the index tape, so the
-cost of a step is fitted by a constant, a part per particle, one per word on the tape and one per spring or drag, none
-negative, with relative errors. Scenes whose contacts are written in Python are left out: the calls cost more than the
-steps.
+cost of a step is fitted by a constant, a part per particle, one per word on the tape, one per spring or drag and one
+per body, none negative, with relative errors. Scenes whose contacts are written in Python are left out: the calls cost
+more than the steps.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ def main() -> None:
     fits = {name: fit(rows[name]) for name in sorted(rows)}
     payload = {
         "source": "python -m benchmarks.laboratory.costs, from benchmarks/results/charts",
-        "units": "us per step and world: constant, per particle, per word on the tape, per spring or drag",
+        "units": "us per step and world: constant, per particle, per word on the tape, per spring or drag, per body",
         "coefficients": {name: coefficients for name, (coefficients, _) in fits.items()},
         "relative_error": {name: error for name, (_, error) in fits.items()},
     }

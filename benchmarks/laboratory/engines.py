@@ -63,8 +63,11 @@ class EngineRun:
         self.world = sy.World(scene, worlds=worlds, method=method)
         if worlds > 1:
             factor = SPREAD[np.arange(worlds) % len(SPREAD)]
-            if self.world.particles.velocity.any():
-                self.world.particles.velocity[:] *= factor[:, None, None]
+            bodies = self.world.bodies
+            moving = [self.world.particles.velocity, bodies.velocity, bodies.angular_momentum]
+            if any(part.any() for part in moving):
+                for part in moving:
+                    part *= factor[:, None, None]
             else:
                 self.world.gravity = factor[:, None] * np.asarray(scene.gravity)
         self.start = self.world.snapshot()
@@ -84,8 +87,9 @@ class EngineRun:
         """See ``Run``."""
         position, velocity = [], []
         for _ in self._looks():
-            position.append(self.world.particles.position[0].copy())
-            velocity.append(self.world.particles.velocity[0].copy())
+            places, speeds = sy.landmarks(self.world)
+            position.append(places[0].copy())
+            velocity.append(speeds[0].copy())
         flags = int(self.world.health[0])
         if flags:
             raise BrokenRunError(

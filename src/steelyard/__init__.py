@@ -10,6 +10,7 @@ from .choice import (
     choose_method,
     kinks_per_second,
 )
+from .diagnostics.landmarks import landmarks
 from .integrators.backward_euler import BackwardEuler
 from .integrators.closed_form import ClosedForm, flight, flight_fall_time, flight_impact
 from .integrators.composed_rattle import ComposedRattle
@@ -128,6 +129,7 @@ __all__ = [
     "inner",
     "kernel",
     "kinks_per_second",
+    "landmarks",
     "normal",
     "scenes",
     "step_impact",

@@ -19,7 +19,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .diagnostics.energy import kinetic_energy
 from .diagnostics.kinks import kink_sides
+from .diagnostics.landmarks import landmarks
 from .integrators.backward_euler import BackwardEuler
 from .integrators.base import Integrator
 from .integrators.closed_form import ClosedForm
@@ -92,7 +94,7 @@ class Candidate:
 
     @staticmethod
     def work(scene: Scene, words: int) -> tuple[float, ...]:
-        """What the cost of a step is made of: 1, particles, words on the tape, springs and drags.
+        """What the cost of a step is made of: 1, particles, words on the tape, springs and drags, bodies.
 
         Kernels work through the tape, but a force with a root and a division is dearer than its words.
         """
@@ -101,7 +103,9 @@ class Candidate:
             len(scene.particles if drag.particles is None else drag.particles)
             for drag in scene.of(Drag)
         )
-        return 1.0, float(len(scene.particles)), float(words), float(len(springs) + drags)
+        bodies = sum(body.movable for body in scene.bodies)
+        counts = (1, len(scene.particles), words, len(springs) + drags, bodies)
+        return tuple(map(float, counts))
 
 
 #: What is measured, charted and chosen from.
@@ -229,7 +233,7 @@ class Choice:
 
 @dataclass(frozen=True)
 class _Track:
-    """One run, at the looks that count: positions (looks, particles, 3), energies (looks,), worst residual of a link.
+    """One run, at the looks that count: landmarks (looks, n, 3), energies (looks,), worst residual of a link.
 
     ``scale`` is what errors of the energy are a share of: the most kinetic energy, the range of the energy, or what
     lifts all particles by a millimetre.
@@ -308,17 +312,16 @@ class _Runs:
             world.step(stride)
             if world.health[0]:
                 return None
-            position.append(world.particles.position[0].copy())
+            position.append(landmarks(world)[0][0].copy())
             energy.append(float(world.energy[0]))
             links = world.residual[0]
             if links.size and look >= first:
                 residual = max(residual, float(np.abs(links).max()))
-            speed = world.particles.velocity[0]
-            kinetic = max(kinetic, 0.5 * float(world.particles.mass_or_zero[0] @ (speed**2).sum(1)))
-        particles = world.particles
-        weight = float(
-            particles.mass_or_zero[0] @ np.linalg.norm(particles.acceleration[0], axis=1)
-        )
+            kinetic = max(kinetic, float(kinetic_energy(world)[0]))
+        weight = 0.0
+        for group in (world.particles, world.bodies) if world.scene.bodies else (world.particles,):
+            pull = np.linalg.norm(group.acceleration[0], axis=1)
+            weight += float(group.mass_or_zero[0] @ pull)
         scale = max(float(np.ptp(energy)), kinetic, weight * _LIFT)
         return _Track(np.stack(position[first:]), np.array(energy[first:]), residual, scale)
 
@@ -499,8 +502,9 @@ def choose_method(
 
     Args:
         scene: what is to be stepped.
-        tolerance: largest error [m] of a particle's place, and largest share of error of the energy (beside the largest
-            of the kinetic energy, the range of the energy, and what lifts all by a millimetre) and of a link's length.
+        tolerance: largest error [m] of a place (particles, and of bodies the origins and the ends of unit axes), and
+            largest share of error of the energy (beside the largest of the kinetic energy, the range of the energy, and
+            what lifts all by a millimetre) and of a link's length.
         horizon: how long the tolerance must hold [s].
         since: from when on errors count [s], within the horizon; for scenes that come to rest, of which only
             the rest matters.

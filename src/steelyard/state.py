@@ -104,7 +104,7 @@ class Group:
 
     @property
     def position(self) -> np.ndarray:
-        """Positions [m], of bodies of their centres of mass, a writable view of shape (worlds, things, 3)."""
+        """Positions [m], of bodies of their frames' origins, a writable view of shape (worlds, things, 3)."""
         return self._vector("position")
 
     @property
@@ -185,8 +185,23 @@ class Bodies(Group):
         return self._vector("orientation", 4)
 
     @property
+    def centre(self) -> np.ndarray:
+        """Centres of mass [m], shape (worlds, bodies, 3): the positions, but for bodies with a pivot."""
+        return self.position + self._arms
+
+    @property
+    def centre_velocity(self) -> np.ndarray:
+        """Velocities of the centres of mass [m/s], shape (worlds, bodies, 3)."""
+        return self.velocity + np.cross(self.angular_velocity, self._arms)
+
+    @property
+    def _arms(self) -> np.ndarray:
+        arms = np.array([body.arm for body in self._world.scene.bodies]).reshape(-1, 3)
+        return np.asarray(np.einsum("wbij,bj->wbi", rotation_matrix(self.orientation), arms))
+
+    @property
     def angular_momentum(self) -> np.ndarray:
-        """Angular momentum of each about its centre of mass [kg m^2/s] along the world's axes, (worlds, bodies, 3).
+        """Angular momentum of each about its frame's origin [kg m^2/s] along the world's axes, (worlds, bodies, 3).
 
         A writable view; it is what the state holds, so it stays where orientation or inertia are assigned.
         """
@@ -234,7 +249,7 @@ class Bodies(Group):
 
     @property
     def inertia(self) -> np.ndarray:
-        """Inertia [kg m^2] about the centre of mass along the body's axes, shape (worlds, bodies, 3, 3).
+        """Inertia [kg m^2] about the frame's origin along the body's axes, shape (worlds, bodies, 3, 3).
 
         Assignable in shape (bodies, 3, 3) or (worlds, bodies, 3, 3).
         """
@@ -286,12 +301,13 @@ def strike(
     bodies = world.bodies
     moment = blow
     if not angular:
-        change = blow / bodies.mass_or_zero[:, k, None]
-        bodies.velocity[chosen, k] += change[chosen]
-        moment = np.zeros((1, 3))
+        place = bodies.centre[:, k]
         if at is not None:
             place = checks.fitted("World", "at", at, size=3, worlds=worlds).reshape(3, -1).T
-            moment = np.cross(place - bodies.position[:, k], blow)
+        moment = np.cross(place - bodies.position[:, k], blow)
+        if body.pivot is None:
+            change = blow / bodies.mass_or_zero[:, k, None]
+            bodies.velocity[chosen, k] += change[chosen]
     bodies.angular_momentum[chosen, k] += np.broadcast_to(moment, (worlds, 3))[chosen]
 
 

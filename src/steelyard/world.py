@@ -339,7 +339,7 @@ class World:
         """Linear momentum [kg m/s] of the movable particles and bodies, shape (worlds, 3)."""
         total = np.einsum("wp,wpc->wc", self.particles.mass_or_zero, self.particles.velocity)
         if self.scene.bodies:
-            total += np.einsum("wb,wbc->wc", self.bodies.mass_or_zero, self.bodies.velocity)
+            total += np.einsum("wb,wbc->wc", self.bodies.mass_or_zero, self.bodies.centre_velocity)
         return total
 
     @property
@@ -348,7 +348,8 @@ class World:
         moment = np.cross(self.particles.position, self.particles.velocity)
         total = np.einsum("wp,wpc->wc", self.particles.mass_or_zero, moment)
         if self.scene.bodies:
-            moment = np.cross(self.bodies.position, self.bodies.velocity)
+            # That of a pivot is where the body's own is taken.
+            moment = np.cross(self.bodies.position, self.bodies.centre_velocity)
             total += np.einsum("wb,wbc->wc", self.bodies.mass_or_zero, moment)
             total += self.bodies.angular_momentum.sum(axis=1)
         return total

@@ -74,7 +74,7 @@ def test_a_body_is_moved_to_its_centre_of_mass() -> None:
         sy.Part(shape=sy.Sphere(0.1), offset=(-1.0, 2.0, 0.0), density=1000.0),
     ]
     body = sy.Body(position=(0.0, 5.0, 0.0), parts=parts)
-    np.testing.assert_allclose(body.centre, (0.5, 0.5, 0.0))
+    np.testing.assert_allclose(body.origin, (0.5, 0.5, 0.0))
     np.testing.assert_allclose(
         [part.offset for part in body.parts], [(0.5, -0.5, 0), (-1.5, 1.5, 0)]
     )

@@ -16,6 +16,7 @@ NAMES = (
     "triple_pendulum",
     "chain",
     "platform",
+    "top",
     "bridge",
     "catenary",
     "cloth",

@@ -19,8 +19,6 @@ from ..scene.scene import SPRINGS
 from .spans import place_of, spans, values
 
 if TYPE_CHECKING:
-    from ..scene.particle import Particle
-    from ..state import Bodies, Particles
     from ..world import World
 
 
@@ -45,7 +43,7 @@ def potential_energy(world: World) -> np.ndarray:
     total = _springs(world) - (particles.mass_or_zero * height).sum(axis=1)
     if world.scene.bodies:
         bodies = world.bodies
-        height = (bodies.acceleration * bodies.position).sum(axis=2)
+        height = (bodies.acceleration * bodies.centre).sum(axis=2)
         total = total - (bodies.mass_or_zero * height).sum(axis=1)
     for force in world.scene.of(Buoyancy, Gravity, UserForce):
         if isinstance(force, Buoyancy):
@@ -53,18 +51,15 @@ def potential_energy(world: World) -> np.ndarray:
         elif isinstance(force, Gravity):
             everything: list[Any] = [*world.scene.particles, *world.scene.bodies]
             for thing in everything if force.particles is None else force.particles:
-                group = bodies_or_particles(world, thing)
+                body = isinstance(thing, Body)
+                places = world.bodies.centre if body else particles.position
+                mass = (world.bodies if body else particles).mass_or_zero
                 k = world._index(thing)
-                along = (world[force].acceleration * group.position[:, k]).sum(axis=-1)
-                total = total - group.mass_or_zero[:, k] * along
+                along = (world[force].acceleration * places[:, k]).sum(axis=-1)
+                total = total - mass[:, k] * along
         else:
             total = total + force.potential(particles.position)
     return total
-
-
-def bodies_or_particles(world: World, thing: Particle | Body) -> Bodies | Particles:
-    """What holds the state of a particle or body."""
-    return world.bodies if isinstance(thing, Body) else world.particles
 
 
 def _springs(world: World) -> np.ndarray:

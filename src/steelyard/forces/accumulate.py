@@ -57,13 +57,13 @@ def load_bodies(tape, s, skip, part):
     place_points(tape, s)
     add_thrusts(tape, s)
     add_surfaces(tape, s)
+    add_applied(tape, s)
 
 
 @stage
 def gather_bodies(tape, s, skip, part):
     """What all forces come to on bodies, after ``sum_forces``."""
     gather_points(tape, s)
-    add_applied(tape, s)
 
 
 @stage
@@ -102,9 +102,9 @@ def acting_forces(acting):
             add_thrusts(tape, s)
         if surfaces:
             add_surfaces(tape, s)
-        if points:
-            gather_points(tape, s)
         if applied:
             add_applied(tape, s)
+        if points:
+            gather_points(tape, s)
 
     return accumulate

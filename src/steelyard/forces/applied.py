@@ -1,7 +1,8 @@
 """Forces on bodies that control sets: a wrench along the world's axes, and thrusters fixed in bodies.
 
-Records: of a wrench, the body's wrench and the rows of the force and torque; of a thruster, the body's orientation, the
-force of its point, its direction in the body's frame, its greatest force and the row of its throttle.
+Records: of a wrench, the rows that sum forces at the centre of mass, the body's torque, and the force and torque; of a
+thruster, the body's orientation, the force of its point, its direction in the body's frame, its greatest force and the
+row of its throttle.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from ..math.rotations import load_turn, rotate
 from ..math.vectors import add_scaled, load_vector
 from ..model.tape import H_APPLIED, H_THRUSTS
 
-APPLIED, THRUST = 2, 5
+APPLIED, THRUST = 3, 5
 
 
 @inner
@@ -23,8 +24,7 @@ def add_applied(tape, s):
     for index in range(tape[at]):
         k = at + 1 + APPLIED * index
         for half in range(2):
-            given = load_vector(s, tape[k + 1] + 3 * half)
-            add_scaled(s, tape[k] + 3 * half, one, *given)
+            add_scaled(s, tape[k + half], one, *load_vector(s, tape[k + 2] + 3 * half))
 
 
 @inner

@@ -4,12 +4,14 @@ With y = (x, v), f(y) = (v, a(x, v)) and the step h:
 
     k1 = f(y),  k2 = f(y + h k1/2),  k3 = f(y + h k2/2),  k4 = f(y + h k3),  y += h (k1 + 2 k2 + 2 k3 + k4)/6.
 
+Bodies turn by the method of Munthe-Kaas on the same stages (``rk4_bodies_part``).
+
 Order 4. An undamped spring is stable while h w < 2 sqrt 2, and loses (h w)^6/72 of its energy at each step below
 that; pure damping is stable while its rate times h is below 2.785. Conserves linear momentum; energy and angular
 momentum to its order. Stiff springs count as plain anchored ones, under the same limits. Across the kink of a bungee
 or of a float the order drops. Refuses links, riders and contacts.
 
-Source: Kutta (1901); Hairer, Norsett & Wanner, *Solving Ordinary Differential Equations I*, II.1.
+Source: Kutta (1901); Hairer, Norsett & Wanner, *Solving Ordinary Differential Equations I*, II.1; Munthe-Kaas (1998).
 """
 
 from __future__ import annotations
@@ -26,10 +28,10 @@ from ..math.rotations import (
     in_frame,
     load_quaternion,
     load_turn,
-    quaternion_product,
     store_unit_quaternion,
+    turned_by,
 )
-from ..math.vectors import load_vector
+from ..math.vectors import cross, load_vector, store_vector
 from ..model.tape import (
     BODY,
     H_ACCELERATION,
@@ -48,7 +50,7 @@ from ..model.tape import (
 from ..solvers.base import Solver
 from ..stage import Stage, stage
 from .base import Acting, Integrator, Recipe
-from .rotor import flag_nonfinite_bodies
+from .rotor import flag_nonfinite_bodies, weight_torque
 
 
 @dataclass(frozen=True)
@@ -59,7 +61,7 @@ class RungeKutta4(Integrator):
     smooth: ClassVar[bool] = True
     evaluations: ClassVar[tuple[float | None, ...]] = (0.0, 0.5, 0.5, 1.0)
     work: ClassVar[int] = 12
-    body_work: ClassVar[int] = 26
+    body_work: ClassVar[int] = 31
     moves_bodies: ClassVar[bool] = True
 
     def recipe(self, solver: Solver | None, acting: Acting) -> Recipe:
@@ -131,14 +133,15 @@ def rk4_part(tape, s, skip, part):
 
 @stage
 def rk4_bodies_part(tape, s, skip, part):
-    """The same for bodies: x' = v, q' = (0, w) q/2, v' = a + F/m - c v, L' = torque - c L.
+    """The same for bodies: x' = v, v' = a + F/m - c v, L' = torque - c L, and the orientation by Munthe-Kaas.
 
-    Work rows: the thirteen numbers of the state at the step's start, then the sums of their rates. Quaternions are of
-    length 1 again at the step's end alone.
+    q = exp(u/2) q0 with the rotation vector u from the step's start, u' = w - u x w/2 + u x (u x w)/12: spin that
+    stands still in space is exact.
+
+    Work rows: x, v, L and q at the step's start; the sums of the rates of x, v, L and u; u and 0.
     """
     dt = load(s, tape[H_DT])
     zero = splat(0.0)
-    half = splat(0.5)
     weight = splat(1.0 if part == 0 or part == 3 else 2.0)
     reach = dt * splat(1.0 / 6.0 if part == 3 else 1.0 if part == 2 else 0.5)
     at = tape[H_BODIES]
@@ -153,7 +156,6 @@ def rk4_bodies_part(tape, s, skip, part):
         ox, oy, oz = in_frame(s, tape[body + 7], f, w, x, y, z, lx, ly, lz)
         wrench = tape[body + 4]
         push = load(s, tape[body + 5])
-        qw, qx, qy, qz = quaternion_product(zero, ox, oy, oz, w, x, y, z)
         brake = zero - load(s, tape[body + 9])
         fx, fy, fz = load_vector(s, wrench)
         ax, ay, az = load_vector(s, tape[body + 8])
@@ -162,26 +164,34 @@ def rk4_bodies_part(tape, s, skip, part):
         az = fma(brake, vz, fma(push, fz, az))
         brake = zero - load(s, tape[body + 9] + 1)
         rx, ry, rz = load_vector(s, wrench + 3)
+        if tape[body + 12] >= 0:
+            gx, gy, gz = weight_torque(tape, s, body)
+            rx = rx + gx
+            ry = ry + gy
+            rz = rz + gz
+            ax = zero
+            ay = zero
+            az = zero
         rx = fma(brake, lx, rx)
         ry = fma(brake, ly, ry)
         rz = fma(brake, lz, rz)
         _advance_vector(s, part, weight, reach, tape[body], start, total, vx, vy, vz)
         _advance_vector(s, part, weight, reach, tape[body + 2], start + 3, total + 3, ax, ay, az)
         _advance_vector(s, part, weight, reach, tape[body + 3], start + 6, total + 6, rx, ry, rz)
-        _advance_row(s, part, weight, reach, turn, start + 9, total + 9, half * qw)
-        _advance_vector(
-            s,
-            part,
-            weight,
-            reach,
-            turn + 1,
-            start + 10,
-            total + 10,
-            half * qx,
-            half * qy,
-            half * qz,
-        )
-        if part == 3:
-            store_unit_quaternion(s, turn, *load_quaternion(s, turn))
+        turned = start + 25
+        if part == 0:
+            for k in range(4):
+                store(s, start + 9 + k, load(s, turn + k))
+            store_vector(s, turned, zero, zero, zero)
+        ux, uy, uz = load_vector(s, turned)
+        cx, cy, cz = cross(ux, uy, uz, ox, oy, oz)
+        dx, dy, dz = cross(ux, uy, uz, cx, cy, cz)
+        ox = fma(splat(1.0 / 12.0), dx, fma(splat(-0.5), cx, ox))
+        oy = fma(splat(1.0 / 12.0), dy, fma(splat(-0.5), cy, oy))
+        oz = fma(splat(1.0 / 12.0), dz, fma(splat(-0.5), cz, oz))
+        _advance_vector(s, part, weight, reach, turned, turned + 3, total + 9, ox, oy, oz)
+        before = load_quaternion(s, start + 9)
+        after = turned_by(*load_vector(s, turned), *before)
+        store_unit_quaternion(s, turn, *after)
     if part == 3:
         flag_nonfinite_bodies(tape, s)

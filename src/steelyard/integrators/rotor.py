@@ -133,17 +133,32 @@ def turn_freely(s, rotor, turn, momentum, inverse, dt):
 
 
 @inner
+def weight_torque(tape, s, body):
+    """Torque m R d x a about the pivot of what accelerates the centre of mass, which lies at d."""
+    f, w, x, y, z = load_turn(s, tape[body + 1])
+    dx, dy, dz = rotate(f, w, x, y, z, *load_vector(s, tape[body + 12]))
+    mass = load(s, tape[body + 11])
+    ax, ay, az = load_vector(s, tape[body + 8])
+    return cross(mass * dx, mass * dy, mass * dz, ax, ay, az)
+
+
+@inner
 def kick_bodies(tape, s, dt, loaded):
     """v += dt (a + F/m), L += dt torque; ``loaded``: whether there are forces beside the acceleration."""
     at = tape[H_BODIES]
     for index in range(tape[at]):
         body = at + 1 + BODY * index
-        add_scaled(s, tape[body + 2], dt, *load_vector(s, tape[body + 8]))
+        pivoted = tape[body + 12] >= 0
+        if pivoted:
+            add_scaled(s, tape[body + 3], dt, *weight_torque(tape, s, body))
+        else:
+            add_scaled(s, tape[body + 2], dt, *load_vector(s, tape[body + 8]))
         if loaded:
             wrench = tape[body + 4]
-            push = dt * load(s, tape[body + 5])
-            add_scaled(s, tape[body + 2], push, *load_vector(s, wrench))
             add_scaled(s, tape[body + 3], dt, *load_vector(s, wrench + 3))
+            if not pivoted:
+                push = dt * load(s, tape[body + 5])
+                add_scaled(s, tape[body + 2], push, *load_vector(s, wrench))
 
 
 @inner

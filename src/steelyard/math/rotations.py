@@ -6,6 +6,8 @@ from ..kernel import inner
 from .lanes import fma, load, splat, sqrt, store
 from .vectors import cross, dot, symmetric_product
 
+_TERMS = 12
+
 
 @inner
 def load_quaternion(s, row):
@@ -44,6 +46,23 @@ def quaternion_product(aw, ax, ay, az, bw, bx, by, bz):
         fma(aw, by, fma(bw, ay, cy)),
         fma(aw, bz, fma(bw, az, cz)),
     )
+
+
+@inner
+def turned_by(ux, uy, uz, w, x, y, z):
+    """The quaternion after a turn by a rotation vector (axis times angle) of the world's frame.
+
+    cos and sin by their series, to rounding for angles of up to four radians.
+    """
+    square = splat(-0.25) * dot(ux, uy, uz, ux, uy, uz)
+    one = splat(1.0)
+    cosine = one
+    sine = one
+    for k in range(_TERMS, 0, -1):
+        cosine = fma(cosine * square, splat(1.0 / ((2 * k - 1) * (2 * k))), one)
+        sine = fma(sine * square, splat(1.0 / ((2 * k) * (2 * k + 1))), one)
+    half = splat(0.5) * sine
+    return quaternion_product(cosine, half * ux, half * uy, half * uz, w, x, y, z)
 
 
 @inner

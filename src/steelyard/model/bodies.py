@@ -68,6 +68,10 @@ class Bodies:
             self._wrenches[id(body)] = self._c.take(9)
         return self._wrenches[id(body)]
 
+    def centre(self, body: Body) -> int:
+        """First row of the force through a body's centre of mass."""
+        return self.wrench(body) if body.pivot is None else self.point("force", body.at(body.arm))
+
     def _inverse(self, body: Body) -> int:
         """Rows of the inverse inertia, 0 where the body is immovable."""
         if id(body) not in self._inverses:
@@ -115,7 +119,7 @@ class Bodies:
         c.sections["applied"] = []
         for thing in c.scene.of(Wrench):
             c.sections["applied"] += [
-                self.wrench(thing.body), c.model.places[thing, "force"][0],
+                self.centre(thing.body), self.wrench(thing.body) + 3, c.model.places[thing, "force"][0],
             ]  # fmt: skip
         c.sections["thrusts"] = []
         for thing in c.scene.of(Thruster):
@@ -199,6 +203,7 @@ class Bodies:
                 ),
                 damping + 2 * place,
                 c.take(work),
+                *self._pivot(body),
             ]  # fmt: skip
 
     @property
@@ -223,6 +228,13 @@ class Bodies:
 
         keys = ((BODIES, "damping"), (BODIES, "angular_damping"))
         return self._c.slot(2 * len(chosen), keys, kept)
+
+    def _pivot(self, body: Body) -> tuple[int, int]:
+        """Rows of the mass of a body with a pivot and of its arm."""
+        if body.pivot is None:
+            return -1, -1
+        arm = np.array(body.arm)
+        return self.mass(body), self._c.slot(3, (), lambda: arm)
 
     def _declare(self) -> None:
         scene, declare = self._c.scene, self._c.parameters.declare

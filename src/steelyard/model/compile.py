@@ -107,7 +107,7 @@ class Compiler:
             "springs": 7, "gravities": 3, "buoyancies": 5, "drags": 7, "stiff_springs": 8, "drift": 1,
             "winches": 3, "movers": 5, "links": LINK, "contacts": CONTACT, "generators": 2,
             "recipe": 2, "unknowns": 4, "spring_blocks": 4, "drag_blocks": 1, "float_blocks": 1,
-            "bodies": BODY, "points": BODY_POINT, "wrenched": WRENCHED, "applied": 2, "thrusts": 5, "surfaces": 8,
+            "bodies": BODY, "points": BODY_POINT, "wrenched": WRENCHED, "applied": 3, "thrusts": 5, "surfaces": 8,
             "propagators": 2, "parts": 2, "compliances": COMPLIANCE, "kinks": KINK,
         }  # fmt: skip
         self.next_row = 0
@@ -173,7 +173,7 @@ class Compiler:
         if isinstance(end, BodyPoint):
             return self.bodies.point(name, end)
         if isinstance(end, Body):
-            return self.bodies.wrench(end)
+            return self.bodies.centre(end)
         return self.header[name] + 3 * self.of(end)
 
     # Parts

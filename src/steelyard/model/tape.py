@@ -123,8 +123,9 @@ CONTACT = 24
 SADDLE_LINK = 10
 COMPLIANCE = 10
 # Records of a movable body: rows of position, orientation, velocity, angular momentum, wrench, inverse mass, inertia,
-# its inverse, acceleration, damping, and work rows; and of a point of a body (``forces.body_points``).
-BODY, BODY_POINT, WRENCHED = 11, 9, 5
+# its inverse, acceleration, damping, work rows, and of a body with a pivot its mass and the arm of that, else -1; and
+# of a point of a body and a wrench (``forces.body_points``).
+BODY, BODY_POINT, WRENCHED = 13, 9, 5
 # Record of a substep of a composition: its length, what damping keeps of particles, growth of impulses, and what it
 # keeps of bodies.
 SUBSTEP = 4

@@ -10,7 +10,7 @@ import numpy as np
 
 from . import checks
 from .particle import Particle
-from .shapes import SHAPES, Part, Shape, mass_properties, rotation_matrix
+from .shapes import SHAPES, Part, Shape, mass_properties, rotation_matrix, steiner
 
 _REMEDY = "Use inverse_mass=0 for a body that nothing can move."
 
@@ -19,19 +19,21 @@ _REMEDY = "Use inverse_mass=0 for a body that nothing can move."
 class Body:
     """A rigid body, free or immovable.
 
-    Its frame has its origin at the centre of mass; parts that are given elsewhere are moved there (``centre`` tells
-    from where).
+    Its frame has its origin at the centre of mass, or at the pivot of a body that has one; parts that are given
+    elsewhere are moved there (``origin`` tells from where).
 
     Args:
-        position: start position of the centre of mass [m].
+        position: start position of the frame's origin [m].
         orientation: start orientation, a quaternion (w, x, y, z) of any length but 0, that turns the body's axes into
             those of the world.
-        velocity: start velocity of the centre of mass [m/s].
+        velocity: start velocity of the centre of mass [m/s]; 0 of a body with a pivot.
         angular_velocity: start angular velocity [rad/s], along the axes of the world.
         parts: what it is made of: shapes, or ``Part`` for those with a place, an orientation or a density of their own.
         mass: mass [kg], above 0; that of the parts by default. Given with parts, it scales their inertia.
         inertia: moments of inertia [kg m^2] about the centre of mass along the body's axes, (3,), or the matrix (3, 3);
-            that of the parts by default.
+            that of the parts by default. Without parts the centre of mass is where the given frame has its origin.
+        pivot: point [m] in the frame in which the parts are given that stands still in the world: the body only turns
+            about it, without friction, as a top or a pendulum does. What holds it there is not told.
         inverse_mass: 0 makes the body immovable: no force moves or turns it.
         acceleration: constant acceleration [m/s^2] of this body in place of the scene's gravity.
         damping: fraction of the velocity kept after one second, in (0, 1].
@@ -49,6 +51,7 @@ class Body:
     parts: Sequence[Shape | Part] | Shape | Part = ()
     mass: float | None = None
     inertia: Any = None
+    pivot: checks.Vector | None = None
     inverse_mass: float | None = None
     acceleration: checks.Vector | None = None
     damping: float = 1.0
@@ -67,35 +70,35 @@ class Body:
         if self.acceleration is not None:
             checks.vectors(self, "acceleration")
         checks.numbers(self, "damping", "angular_damping")
-        self.centre = (0.0, 0.0, 0.0)
-        self.parts = self._parts()
+        if self.pivot is not None:
+            checks.vectors(self, "pivot")
+        parts = self._given_parts()
+        centre = mass_properties(parts)[1] if parts else np.zeros(3)
+        origin = centre if self.pivot is None else np.array(self.pivot)
+        #: The frame's origin in the frame in which the parts were given [m].
+        self.origin = tuple(origin.tolist())
+        #: The centre of mass in the body's frame [m]: 0 but for a body with a pivot.
+        self.arm = tuple((centre - origin).tolist())
+        self.parts = tuple(part.moved(-origin) for part in parts)
         if self.inverse_mass is not None:
             self._immovable()
         else:
             self._weigh()
+        if self.pivot is not None and any(self.velocity):
+            raise ValueError(
+                f"Body: velocity is {self.velocity} with a pivot at {self.pivot}, which stands still; it must be 0. "
+                "Give angular_velocity."
+            )
 
-    def _parts(self) -> tuple[Part, ...]:
-        """The parts as such, about their centre of mass."""
+    def _given_parts(self) -> list[Part]:
+        """The parts as such."""
         given = [self.parts] if isinstance(self.parts, (*SHAPES, Part)) else self.parts
         try:
-            parts = [part if isinstance(part, Part) else Part(shape=part) for part in given]
+            return [part if isinstance(part, Part) else Part(shape=part) for part in given]
         except TypeError:
             raise TypeError(
                 f"Body: parts is {self.parts!r}; it must be a shape, a Part or a list of these. Give one."
             ) from None
-        if not parts:
-            return ()
-        _, centre, _ = mass_properties(parts)
-        self.centre = tuple(centre.tolist())
-        return tuple(
-            Part(
-                shape=part.shape,
-                offset=np.array(part.offset) - centre,
-                orientation=part.orientation,
-                density=part.density,
-            )
-            for part in parts
-        )
 
     def _immovable(self) -> None:
         if self.inverse_mass != 0.0 or self.mass is not None:
@@ -129,11 +132,11 @@ class Body:
         self.inverse_mass = 1.0 / self.mass
         if self.inertia is not None:
             inertia = inertia_matrix("Body", self.inertia)
-        self.inertia = inertia
+        self.inertia = inertia + steiner(self.mass, np.array(self.arm))
 
     @property
     def angular_momentum(self) -> np.ndarray:
-        """Angular momentum at the start about the centre of mass [kg m^2/s], along the world's axes, (3,)."""
+        """Angular momentum at the start about the frame's origin [kg m^2/s], along the world's axes, (3,)."""
         turn = rotation_matrix(np.array(self.orientation))
         return np.asarray(turn @ self.inertia @ turn.T @ np.array(self.angular_velocity))
 
@@ -143,7 +146,7 @@ class Body:
         return bool(self.inverse_mass)
 
     def at(self, place: checks.Vector) -> BodyPoint:
-        """The point of the body at a place in its frame [m], from the centre of mass along the body's axes."""
+        """The point of the body at a place in its frame [m], from the origin along the body's axes."""
         return BodyPoint(self, place)
 
 
@@ -177,7 +180,7 @@ class BodyPoint:
 
     Args:
         body: the body.
-        place: place in its frame [m], from the centre of mass along the body's axes.
+        place: place in its frame [m], from the origin along the body's axes.
     """
 
     body: Body

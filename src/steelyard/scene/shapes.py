@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -184,6 +184,10 @@ class Part:
         density = checks.number("Part", "density", self.density, _DENSITY)
         object.__setattr__(self, "density", density)
 
+    def moved(self, by: np.ndarray) -> Part:
+        """The same elsewhere."""
+        return replace(self, offset=np.array(self.offset) + by)
+
     @property
     def mass(self) -> float:
         """[kg]."""
@@ -207,16 +211,18 @@ def rotation_matrix(quaternion: np.ndarray) -> np.ndarray:
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
-def mass_properties(parts: Sequence[Part]) -> tuple[float, np.ndarray, np.ndarray]:
-    """Mass [kg], centre of mass (3,) [m] and inertia about it (3, 3) [kg m^2] of parts together.
+def steiner(mass: float, arm: np.ndarray) -> np.ndarray:
+    """What a mass [kg] at ``arm`` (3,) [m] adds to an inertia, m (d.d - d d^T): the theorem of parallel axes."""
+    return np.asarray(mass * (arm @ arm * np.eye(3) - np.outer(arm, arm)))
 
-    Inertia by Steiner's theorem of parallel axes: a part of mass m at d from the centre adds m (d.d - d d^T).
-    """
+
+def mass_properties(parts: Sequence[Part]) -> tuple[float, np.ndarray, np.ndarray]:
+    """Mass [kg], centre of mass (3,) [m] and inertia about it (3, 3) [kg m^2] of parts together."""
     masses = np.array([part.mass for part in parts])
     offsets = np.array([part.offset for part in parts])
     mass = float(masses.sum())
     centre = masses @ offsets / mass
     inertia = np.zeros((3, 3))
     for part, m, d in zip(parts, masses, offsets - centre, strict=True):
-        inertia += part.inertia + m * (d @ d * np.eye(3) - np.outer(d, d))
+        inertia += part.inertia + steiner(m, d)
     return mass, centre, inertia
