@@ -3,9 +3,9 @@
     python -m benchmarks.laboratory.choices [PROBLEM ...]
 
 For each: the method that ``choose_method`` picks is run and scored by the problem's own errors, and its cost is held
-against that of the cheapest method known there. Costs are of the charts: what a step took, over the largest step
-that holds the tolerance with all shorter ones, found between two rungs of the ladder by the slope between them. Where
-that is cheaper by more than a fifth, it is run: it counts if it holds there and at three shorter steps.
+against that of the cheapest method known there. Costs are of the charts, between two rungs of the
+ladder by the slope between them; so is the largest step that holds the tolerance with all shorter ones. Where that is
+cheaper by more than a fifth, it is run: it counts if it holds there and at three shorter steps.
 """
 
 from __future__ import annotations
@@ -101,16 +101,15 @@ def judge(problem: Problem, points: Sequence[Mapping[str, Any]]) -> list[dict[st
         else:
             name = choice.considered[0].name
             error = score(problem, choice.method)
-            step = step_cost(points, name)
+            cost = cost_at(points, name, choice.method.dt)
             row |= {
                 "choice": name,
                 "dt": choice.method.dt,
                 "error": error,
                 "held": error <= tolerance,
             }
-            if best is not None and step is not None:
+            if best is not None and cost is not None:
                 # What holds by luck at one step and not at the next is no method to be measured by.
-                cost = step / choice.method.dt
                 best = row["best"] = costs.best(below=cost / DEARER) or best
                 row["ratio"] = cost / costs.cost[best] if best in costs.cost else 1.0
         rows.append(row)
@@ -146,14 +145,25 @@ def _stepping(method: sy.Method, dt: float) -> sy.Method:
     return sy.Method(method.integrator, method.solver, dt=dt)
 
 
-def step_cost(points: Sequence[Mapping[str, Any]], name: str) -> float | None:
-    """What a step of a method took [us per world]."""
-    costs = [
-        point["per_second"] * point["dt"]
+def cost_at(points: Sequence[Mapping[str, Any]], name: str, dt: float) -> float | None:
+    """What a simulated second and world costs at a step [us], between and beyond the rungs of the chart.
+
+    Not by the cost of a step: where events or fast turns divide steps, longer ones cost more.
+    """
+    costs = {
+        point["dt"]: point["per_second"]
         for point in points
         if point["method"] == name and point["per_second"] and point["worlds"] > 1
-    ]
-    return float(np.median(costs)) if costs else None
+    }
+    if not costs:
+        return None
+    rungs = sorted(costs)
+    if len(rungs) == 1:
+        return float(costs[rungs[0]] * rungs[0] / dt)
+    k = min(max(int(np.searchsorted(rungs, dt)), 1), len(rungs) - 1)
+    low, high = rungs[k - 1], rungs[k]
+    slope = math.log(costs[high] / costs[low]) / math.log(high / low)
+    return float(costs[low] * (dt / low) ** slope)
 
 
 class Known:
@@ -169,15 +179,14 @@ class Known:
         self.problem, self.tolerance = problem, tolerance
         self.cost: dict[str, float] = {}
         self._left: dict[str, list[float]] = {}
-        self._step: dict[str, float] = {}
+        self._points = points
         self._stands: set[str] = set()
         for candidate in sy.CANDIDATES:
-            step = step_cost(points, candidate.name)
             steps = longest(points, candidate.name, tolerance)
-            if step is not None and steps:
-                self._step[candidate.name] = step
+            cost = cost_at(points, candidate.name, steps[0]) if steps else None
+            if cost is not None:
                 self._left[candidate.name] = steps
-                self.cost[candidate.name] = step / steps[0]
+                self.cost[candidate.name] = cost
 
     def best(self, *, below: float = 0.0) -> str | None:
         """The cheapest method; one that costs less than ``below`` is run, with its neighbours, to see that it holds."""
@@ -187,7 +196,7 @@ class Known:
                 return name
             self._left[name].pop(0)
             if self._left[name]:
-                self.cost[name] = self._step[name] / self._left[name][0]
+                self.cost[name] = cost_at(self._points, name, self._left[name][0]) or math.inf
             else:
                 del self.cost[name]
         return None

@@ -4,8 +4,8 @@
 
 Reads what ``make charts`` measured and writes src/steelyard/costs.json. Kernels work through the index tape, so the
 cost of a step is fitted by a constant, a part per particle, one per word on the tape, one per spring or drag and one
-per body, none negative, with relative errors. Scenes whose contacts are written in Python are left out: the calls cost
-more than the steps.
+per part of a body's turn, none negative, with relative errors. Scenes whose contacts are written in Python are left
+out: the calls cost more than the steps.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ TABLE = record.ROOT / "src" / "steelyard" / "costs.json"
 
 
 def measured() -> dict[str, list[tuple[float, ...]]]:
-    """By method: what ``Candidate.work`` counts, then the cost of running a step once [us]; a row per problem."""
+    """By method: what ``Candidate.work`` counts, then the cost of running a step once [us]; by problem and work."""
     rows: dict[str, list[tuple[float, ...]]] = {}
     for name in problems.NAMES:
         found = json.loads((CHARTS / f"{name}.json").read_text())["variants"]
@@ -36,18 +36,18 @@ def measured() -> dict[str, list[tuple[float, ...]]]:
             for candidate in methods.able(problem, scene):
                 kinked = candidate.integrator.divisions > 0 and candidate.solver is None
                 events = sy.kinks_per_second(scene, problem.duration) if kinked else 0.0
-                costs = [
-                    point["per_second"] * point["dt"] / candidate.runs(events * point["dt"])
-                    for point in found[problem.name]["points"]
-                    if point["method"] == candidate.name
-                    and point["per_second"]
-                    and point["worlds"] > 1
-                ]
-                if costs:
-                    world = sy.World(scene, method=candidate.at(problem.stretch / 8.0))
-                    rows.setdefault(candidate.name, []).append(
-                        (*candidate.work(scene, world.model.words), float(np.median(costs)))
-                    )
+                costs: dict[tuple[float, ...], list[float]] = {}
+                words = sy.World(scene, method=candidate.at(problem.stretch / 8.0)).model.words
+                for point in found[problem.name]["points"]:
+                    alike = point["method"] == candidate.name and point["worlds"] > 1
+                    if alike and point["per_second"]:
+                        dt = point["dt"]
+                        work = candidate.work(scene, words, dt)
+                        cost = point["per_second"] * dt / candidate.runs(events * dt)
+                        costs.setdefault(work, []).append(cost)
+                for work, found_costs in costs.items():
+                    row = (*work, float(np.median(found_costs)))
+                    rows.setdefault(candidate.name, []).append(row)
     return rows
 
 
@@ -65,14 +65,15 @@ def main() -> None:
     fits = {name: fit(rows[name]) for name in sorted(rows)}
     payload = {
         "source": "python -m benchmarks.laboratory.costs, from benchmarks/results/charts",
-        "units": "us per step and world: constant, per particle, per word on the tape, per spring or drag, per body",
+        "units": "us per step and world: constant, per particle, per word on the tape, per spring or drag, "
+        "per part of a body's turn",
         "coefficients": {name: coefficients for name, (coefficients, _) in fits.items()},
         "relative_error": {name: error for name, (_, error) in fits.items()},
     }
     TABLE.write_text(json.dumps(payload, indent=1) + "\n")
     for name, (coefficients, error) in fits.items():
         parts = "  ".join(f"{value:.3g}" for value in coefficients)
-        print(f"{name:<28} {parts}   within {error:.0%} over {len(rows[name])} scenes")
+        print(f"{name:<28} {parts}   within {error:.0%} over {len(rows[name])} rows")
 
 
 if __name__ == "__main__":

@@ -35,6 +35,7 @@ from .integrators.kink_rk4 import KinkRungeKutta4
 from .integrators.linearly_implicit import LinearlyImplicit
 from .integrators.rattle import Rattle
 from .integrators.rk4 import RungeKutta4
+from .integrators.rotor import parts_of
 from .integrators.symplectic_euler import SymplecticEuler
 from .math.pointers import LANES
 from .methods import Method
@@ -92,20 +93,26 @@ class Candidate:
         turns = (1.0 - np.cumsum(chances) ** LANES).sum()
         return 1.0 + 3.0 * float(turns)
 
-    @staticmethod
-    def work(scene: Scene, words: int) -> tuple[float, ...]:
-        """What the cost of a step is made of: 1, particles, words on the tape, springs and drags, bodies.
+    def work(self, scene: Scene, words: int, dt: float) -> tuple[float, ...]:
+        """What a step's cost is made of: 1, particles, words on the tape, springs and drags, parts of bodies' turns.
 
-        Kernels work through the tape, but a force with a root and a division is dearer than its words.
+        Kernels work through the tape, but a force with a root and a division is dearer than its words. Bodies that turn
+        freely do so in parts, the more the faster they spin and the longer the step.
         """
         springs = scene.of(Spring, Bungee, AnchoredSpring, AnchoredBungee, StiffSpring)
         drags = sum(
             len(scene.particles if drag.particles is None else drag.particles)
             for drag in scene.of(Drag)
         )
-        bodies = sum(body.movable for body in scene.bodies)
-        counts = (1, len(scene.particles), words, len(springs) + drags, bodies)
-        return tuple(map(float, counts))
+        longest = dt * max(map(abs, self.integrator.fractions))
+        turns = sum(
+            parts_of(body.angular_momentum, np.asarray(body.inertia), longest)
+            if self.integrator.turns_freely
+            else 1
+            for body in scene.bodies
+            if body.movable
+        )
+        return tuple(map(float, (1, len(scene.particles), words, len(springs) + drags, turns)))
 
 
 #: What is measured, charted and chosen from.
@@ -269,9 +276,7 @@ class _Runs:
         self.events = 0.0
         self._world: type[World] = World
         self._tracks: dict[tuple[int, int], _Track | None] = {}
-        model = self._build(_LOOKS).model
-        each = cost_table()[candidate.name]
-        self.step_cost = sum(map(mul, each, candidate.work(scene, model.words)))
+        self._words = self._build(_LOOKS).model.words
 
     def dt(self, steps: int) -> float:
         """Step [s] of a run of so many."""
@@ -280,7 +285,9 @@ class _Runs:
     def cost(self, steps: int) -> float:
         """Expected cost [us per simulated second and world]."""
         dt = self.dt(steps)
-        return self.step_cost * self.candidate.runs(self.events * dt) / dt
+        each = cost_table()[self.candidate.name]
+        step = sum(map(mul, each, self.candidate.work(self._scene, self._words, dt)))
+        return step * self.candidate.runs(self.events * dt) / dt
 
     def _build(self, steps: int) -> World:
         return self._world(self._scene, method=self.candidate.at(self.dt(steps)))
@@ -533,7 +540,7 @@ def choose_method(
     found: list[Considered] = []
     best, limit = reference.error, math.inf
     if reference.error <= 0.5 * allowed:
-        for run in sorted(runs, key=lambda run: (-run.order, run.step_cost)):
+        for run in sorted(runs, key=lambda run: (-run.order, run.cost(start))):
             name = run.candidate.name
             steps, error, least = _smallest(run, reference, start, allowed, limit, margin)
             best = min(best, least)

@@ -43,7 +43,7 @@ def ball() -> sy.Scene:
 def test_every_candidate_has_a_cost() -> None:
     assert {candidate.name for candidate in sy.CANDIDATES} <= set(cost_table())
     for name, coefficients in cost_table().items():
-        assert len(coefficients) == len(sy.Candidate.work(spring(), 1)), name
+        assert len(coefficients) == len(sy.CANDIDATES[0].work(spring(), 1, 0.01)), name
         assert min(coefficients) >= 0.0 and max(coefficients) > 0.0, name
 
 

@@ -74,3 +74,29 @@ def test_a_broken_world_still_makes_a_drawing() -> None:
 def test_a_world_that_is_not_there_is_refused() -> None:
     with pytest.raises(IndexError, match="index is 3"):
         sy.draw.draw_world(sy.World(one_of_each(), worlds=3), 3)
+
+
+def test_bodies_are_drawn_as_they_lie() -> None:
+    scene = sy.Scene()
+    box = scene.add(
+        sy.Body(
+            position=(1.0, 2.0, 0.0),
+            parts=[sy.Box((0.5, 0.1, 0.2)), sy.Part(shape=sy.Sphere(0.3), offset=(0.0, 0.0, 0.0))],
+        )
+    )
+    scene.add(sy.Body(position=(-2.0, 2.0, 0.0), parts=sy.Capsule(0.1, 0.4), inverse_mass=0.0))
+    scene.add(sy.Body(position=(0.0, 4.0, 0.0), inertia=(1.0, 1.0, 1.0)))
+    scene.add(sy.AnchoredSpring(box.at((0.5, 0.0, 0.0)), (1.0, 5.0, 0.0), 1.0, 1.0))
+    world = sy.World(scene, worlds=2)
+    # A quarter turn about z lays the long side upright.
+    world.bodies.orientation[1, 0] = np.array([1.0, 0.0, 0.0, 1.0]) / np.sqrt(2.0)
+    drawing = sy.draw.draw_world(world, 1)
+    corners = np.array([point for face in drawing.faces for point in face.points])
+    assert len(drawing.faces) == 6
+    np.testing.assert_allclose(np.ptp(corners, axis=0), (0.2, 1.0, 0.4), atol=1e-12)
+    np.testing.assert_allclose(corners.mean(axis=0), (1.0, 2.0, 0.0), atol=1e-12)
+    tip = np.array([line.start for line in drawing.lines if line.color == palette.TARGET])
+    assert np.abs(tip - (1.0, 2.5, 0.0)).sum(axis=1).min() < 1e-12
+    assert any(line.width == 0.2 and line.color == palette.EARTH for line in drawing.lines)
+    axes = [line for line in drawing.lines if line.start == (0.0, 4.0, 0.0)]
+    assert len(axes) == 3

@@ -7,19 +7,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..diagnostics.spans import place_of
 from ..scene.contacts import Collisions, ContactGenerator, Ground, LinePlatform
 from ..scene.forces import (
     AnchoredBungee,
-    AnchoredSpring,
     Bungee,
     Buoyancy,
-    Spring,
     StiffSpring,
     UserForce,
 )
 from ..scene.links import Cable, CableConstraint, Rod, RodConstraint
 from ..scene.rider import Rider
+from ..scene.scene import SPRINGS
 from . import palette
+from .bodies import draw_body
 from .primitives import Color, Drawing
 
 if TYPE_CHECKING:
@@ -38,9 +39,10 @@ _SLACK = 110
 def draw_world(world: World, index: int = 0, *, forces: bool = False) -> Drawing:
     """What one world looks like now.
 
-    Particles are balls of their radius (a small one if they have none), loads of riders orange, immovable ones
-    dark. Rods are struts; cables ropes, pale while slack; springs coils, red in tension and blue in
-    compression, pale while a bungee is slack. Touching contacts are rings with their normals.
+    Particles are balls of their radius (a small one if they have none), loads of riders orange, immovable ones dark.
+    Bodies are their parts, blue-green, immovable ones grey; those without parts are three axes. Rods are struts; cables
+    ropes, pale while slack; springs coils, red in tension and blue in compression, pale while a bungee is slack.
+    Touching contacts are rings with their normals.
 
     Args:
         world: the worlds.
@@ -66,7 +68,8 @@ class _WorldDrawing:
         self.index = index
         self.drawing = Drawing()
         self.position = np.array(world.particles.position[index])
-        places = self.position[np.isfinite(self.position).all(axis=1)]
+        everything = np.concatenate([self.position, world.bodies.position[index]])
+        places = everything[np.isfinite(everything).all(axis=1)]
         span = np.ptp(places, axis=0).max() if len(places) else 0.0
         self.extent = max(float(span), 1.0)
         self.middle = places.mean(axis=0) if len(places) else np.zeros(3)
@@ -84,9 +87,13 @@ class _WorldDrawing:
             self._surface(thing)
         for thing in scene.of(Rod, RodConstraint, Cable, CableConstraint):
             self._link(thing)
-        for thing in scene.of(Spring, Bungee, AnchoredSpring, AnchoredBungee, StiffSpring):
+        for thing in scene.of(*SPRINGS):
             self._spring(thing)
         self._particles()
+        for k, body in enumerate(scene.bodies):
+            place = self.world.bodies.position[self.index, k]
+            turn = self.world.bodies.orientation[self.index, k]
+            draw_body(self.drawing, body, place, turn, axes=0.3 * self.extent)
         for generator in scene.of(Ground, LinePlatform, Collisions, ContactGenerator):
             self._contacts(generator)
         if forces:
@@ -107,8 +114,8 @@ class _WorldDrawing:
         radii = self.world.model.parameters.values["particles", "radius"]
         return radii[:, self.index] if radii.ndim == 2 else radii
 
-    def _of(self, particle: Any) -> Vector:
-        return np.asarray(self.position[self.world._index(particle)])
+    def _of(self, end: Any) -> Vector:
+        return np.array(place_of(self.world, end)[self.index])
 
     def _ends(self, thing: Any) -> tuple[Vector, Vector]:
         """The two ends of a link or spring; a fixed end gets a mark."""

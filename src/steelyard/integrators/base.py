@@ -61,8 +61,9 @@ class Integrator:
     #: Scratch rows per particle that it works in, and per body.
     work: ClassVar[int] = 0
     body_work: ClassVar[int] = 0
-    #: Whether it moves rigid bodies.
+    #: Whether it moves rigid bodies, and turns them by the exact flow of a free rotor.
     moves_bodies: ClassVar[bool] = False
+    turns_freely: ClassVar[bool] = False
     #: Whether it works with a solver of displacements and velocities (True), of impulses (False).
     solver_stages: ClassVar[tuple[bool, ...]] = ()
 

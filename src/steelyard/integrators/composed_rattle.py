@@ -91,6 +91,7 @@ class ComposedRattle(Integrator):
     solver_stages: ClassVar[tuple[bool, ...]] = (True,)
     reverses: ClassVar[bool] = True
     moves_bodies: ClassVar[bool] = True
+    turns_freely: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         checks.whole("ComposedRattle", "substeps", self.substeps, least=1, remedy="Use 5.")

@@ -37,6 +37,7 @@ class Rattle(Integrator):
     evaluations: ClassVar[tuple[float | None, ...]] = (0.0, 1.0)
     solver_stages: ClassVar[tuple[bool, ...]] = (True,)
     moves_bodies: ClassVar[bool] = True
+    turns_freely: ClassVar[bool] = True
 
     def recipe(self, solver: Solver | None, acting: Acting) -> Recipe:
         """Both halves, each followed by its stage of the constraints."""

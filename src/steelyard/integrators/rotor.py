@@ -15,6 +15,10 @@ Differential Equations I*, I.8 (series).
 
 from __future__ import annotations
 
+import math
+
+import numpy as np
+
 from ..kernel import inner
 from ..math.lanes import absolute, any_lane, fma, load, select, splat, sqrt, store
 from ..math.rotations import (
@@ -48,6 +52,13 @@ _ORDER = 10
 ROTOR_ROWS = 10 * (_ORDER + 1)
 _LONGEST = 0.375
 _HALVINGS = 12
+
+
+def parts_of(momentum: np.ndarray, inertia: np.ndarray, dt: float) -> int:
+    """In how many parts a step of a free rotor is taken, from its angular momentum (3,) and inertia (3, 3)."""
+    angle = abs(dt) * float(np.linalg.norm(momentum)) * float(np.trace(np.linalg.inv(inertia)))
+    halvings = math.ceil(math.log2(max(angle / _LONGEST, 1.0)))
+    return 1 << min(halvings, _HALVINGS)
 
 
 @inner

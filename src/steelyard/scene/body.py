@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, cast
 
 import numpy as np
 
@@ -133,6 +133,11 @@ class Body:
         if self.inertia is not None:
             inertia = inertia_matrix("Body", self.inertia)
         self.inertia = inertia + steiner(self.mass, np.array(self.arm))
+
+    @property
+    def placed(self) -> tuple[Part, ...]:
+        """The parts, each at its place in the body's frame."""
+        return cast(tuple[Part, ...], self.parts)
 
     @property
     def angular_momentum(self) -> np.ndarray:
