@@ -134,7 +134,7 @@ def score(problem: Problem, method: sy.Method) -> float:
                 return math.inf
             if stretches * hit in problem.looks:
                 look = problem.looks.index(stretches * hit)
-                places, speeds = sy.landmarks(world)
+                places, speeds = problem.marks(world)
                 motion.position[look], motion.velocity[look] = places[0], speeds[0]
     except BrokenRunError:
         return math.inf

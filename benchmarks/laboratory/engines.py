@@ -87,7 +87,7 @@ class EngineRun:
         """See ``Run``."""
         position, velocity = [], []
         for _ in self._looks():
-            places, speeds = sy.landmarks(self.world)
+            places, speeds = self.problem.marks(self.world)
             position.append(places[0].copy())
             velocity.append(speeds[0].copy())
         flags = int(self.world.health[0])

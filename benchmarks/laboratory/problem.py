@@ -74,6 +74,8 @@ class Problem:
         peer_steps: Ladder of the peers where it is another.
         forms: Other ways to write the same physics, by name; each is charted with one method, the one
             that `best` names with it or velocity Verlet.
+        marks: Positions and velocities of a world that errors are measured at, (worlds, n, 3) each; for forms
+            whose particles and bodies are others than the scene's.
         omitted: Methods that are not charted, with the reason.
         best: Name of a method that follows the motion, for tests.
         wrong: What a defective engine would do, by the defect: scenes that differ from the true one
@@ -89,6 +91,7 @@ class Problem:
     peers: Mapping[str, Peer] = field(default_factory=dict)
     peer_steps: tuple[int, ...] | None = None
     forms: Mapping[str, Callable[[], sy.Scene]] = field(default_factory=dict)
+    marks: Callable[[sy.World], tuple[Array, Array]] = sy.landmarks
     omitted: Mapping[str, str] = field(default_factory=dict)
     best: str
     wrong: Mapping[str, Callable[[], sy.Scene]]
