@@ -73,20 +73,19 @@ def _series(s, rotor, inverse):
         qx = zero
         qy = zero
         qz = zero
+        # Sums of L x w and of q (0, w), a product and a sum in one.
         for i in range(k + 1):
             row = rotor + 10 * i
             wx, wy, wz = load_vector(s, rotor + 10 * (k - i) + 3)
             x, y, z = load_vector(s, row)
-            cx, cy, cz = cross(x, y, z, wx, wy, wz)
-            lx = lx + cx
-            ly = ly + cy
-            lz = lz + cz
+            lx = fma(y, wz, fma(zero - z, wy, lx))
+            ly = fma(z, wx, fma(zero - x, wz, ly))
+            lz = fma(x, wy, fma(zero - y, wx, lz))
             w, x, y, z = load_quaternion(s, row + 6)
-            pw, px, py, pz = quaternion_product(w, x, y, z, zero, wx, wy, wz)
-            qw = qw + pw
-            qx = qx + px
-            qy = qy + py
-            qz = qz + pz
+            qw = qw - dot(x, y, z, wx, wy, wz)
+            qx = fma(w, wx, fma(y, wz, fma(zero - z, wy, qx)))
+            qy = fma(w, wy, fma(z, wx, fma(zero - x, wz, qy)))
+            qz = fma(w, wz, fma(x, wy, fma(zero - y, wx, qz)))
         share = splat(1.0 / (k + 1))
         half = splat(0.5 / (k + 1))
         row = rotor + 10 * (k + 1)
