@@ -13,7 +13,7 @@ from .integrators.symplectic_euler import SymplecticEuler
 from .scene import checks
 from .scene.body_forces import SURFACES
 from .scene.contacts import ContactGenerator
-from .scene.forces import Drag, StiffSpring, UserForce
+from .scene.forces import Drag, Explosion, StiffSpring, UserForce
 from .scene.links import Cable, CableConstraint
 from .scene.rider import Rider
 from .scene.scene import CONTACTS, FORCES, LINKS, SPRINGS, Scene
@@ -81,6 +81,11 @@ class Method:
         if scene.bodies and not self.integrator.moves_bodies:
             raise ValueError(
                 f"{name} cannot step a Body; it steps particles. Use Rattle(), ComposedRattle() or RungeKutta4()."
+            )
+        if scene.of(Explosion) and not self.integrator.tells_time:
+            raise ValueError(
+                f"{name} cannot take an Explosion: its force depends on the time, which this method does not tell. Use "
+                "Rattle() or RungeKutta4()."
             )
         if (
             self.solver is not None

@@ -72,5 +72,6 @@ def things(a: sy.Particle, b: sy.Particle) -> list[Any]:
         sy.AnchoredBungee(a, ORIGIN, 1.0, 1.0),
         sy.StiffSpring(a, ORIGIN, 1.0),
         sy.Buoyancy(a, 0.0, 1.0, 1.0),
+        sy.Explosion(place=ORIGIN, wave_force=1.0, particles=some),
         sy.UserForce(no_force, particles=some),
     ]

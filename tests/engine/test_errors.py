@@ -278,6 +278,7 @@ CHOOSING: list[Callable[..., Any]] = [
     lambda some: sy.Gravity((0, 1, 0), particles=some),
     lambda some: sy.Drag(linear=1.0, particles=some),
     lambda some: sy.UserForce(no_force, particles=some),
+    lambda some: sy.Explosion(place=ORIGIN, particles=some),
     lambda some: sy.Ground(particles=some),
     lambda some: sy.Collisions(particles=some),
     lambda some: sy.LinePlatform(start=ORIGIN, end=(1, 0, 0), radius=0.1, particles=some),

@@ -53,6 +53,13 @@ def _drag(x: Array, v: Array) -> Array:
     return -(0.8 * speed + 0.3 * speed**2) * relative / speed
 
 
+def _implosion(x: Array, v: Array) -> Array:
+    """What an explosion begins with."""
+    away = x - ANCHOR
+    distance = np.linalg.norm(away, axis=-1, keepdims=True)
+    return np.where(distance > 0.3, -6.0 * away / distance, 0.0)
+
+
 def _stiff(x: Array, v: Array) -> Array:
     on_a = -40.0 * (x[:, 0] - ANCHOR) - 3.0 * v[:, 0]
     return np.stack([on_a, np.zeros_like(on_a)], axis=1)
@@ -159,6 +166,41 @@ CASES = [
         },
     ),
     Case(
+        sy.Explosion,
+        lambda a, b: sy.Explosion(
+            place=ANCHOR,
+            start=-0.02,
+            implosion_force=6.0,
+            implosion_duration=0.05,
+            implosion_least=0.3,
+            implosion_most=9.0,
+            wave_force=30.0,
+            wave_speed=2.0,
+            wave_duration=2.0,
+            wave_thickness=4.0,
+            convection_force=8.0,
+            chimney_radius=3.0,
+        ),
+        _implosion,
+        conservative=False,
+        parameters={
+            "place": [(0.0, 0.0, 0.0), (1.0, 2.0, 3.0), (-1.0, 0.5, 0.0)],
+            "start": [-0.04, -0.02, 5.0],
+            "implosion_force": [0.0, 3.0, 40.0],
+            "implosion_duration": [0.0, 0.05, 0.5],
+            "implosion_least": [0.0, 0.3, 3.0],
+            "implosion_most": [0.0, 2.0, 9.0],
+            "wave_force": [0.0, 5.0, 50.0],
+            "wave_duration": [0.06, 1.0, 9.0],
+            "wave_speed": [0.0, 1.0, 20.0],
+            "wave_thickness": [0.5, 2.0, 9.0],
+            "convection_force": [0.0, 4.0, 30.0],
+            "convection_duration": [0.06, 1.0, 9.0],
+            "chimney_radius": [0.5, 2.0, 9.0],
+            "chimney_height": [0.1, 2.0, 9.0],
+        },
+    ),
+    Case(
         sy.UserForce,
         lambda a, b: sy.UserForce(_cubic, energy=_quartic),
         lambda x, v: _cubic(x, v, np.zeros(len(x))),
@@ -255,8 +297,8 @@ def test_force_is_its_formula_in_the_limit_of_a_small_step(case: Case, integrato
     np.testing.assert_allclose(measure(world), expected, rtol=0, atol=1e-4)
 
 
-def test_all_forces_but_drag_have_an_energy() -> None:
-    assert [case.kind for case in CASES if not case.conservative] == [sy.Drag]
+def test_all_forces_but_drag_and_explosions_have_an_energy() -> None:
+    assert [case.kind for case in CASES if not case.conservative] == [sy.Drag, sy.Explosion]
 
 
 @every_energy

@@ -5,15 +5,25 @@ from __future__ import annotations
 from functools import cache
 
 from ..kernel import inner
-from ..math.lanes import any_lane, load, splat, store
+from ..math.lanes import any_lane, fma, load, splat, store
 from ..math.pointers import axes
-from ..model.tape import H_ACTIVE, H_FORCE, H_FORCED, H_PARTICLES, H_USER_FORCES
+from ..model.tape import (
+    H_ACTIVE,
+    H_DT,
+    H_FORCE,
+    H_FORCED,
+    H_NOW,
+    H_PARTICLES,
+    H_TIME,
+    H_USER_FORCES,
+)
 from ..stage import stage
 from .aero import add_surfaces
 from .applied import add_applied, add_thrusts
 from .body_points import clear_wrenches, gather_points, place_points
 from .buoyancy import add_buoyancy
 from .drag import add_drag
+from .explosion import add_explosions
 from .gravity import add_gravity
 from .springs import add_springs
 
@@ -46,6 +56,7 @@ def accumulate_forces(tape, s):
     add_springs(tape, s)
     add_gravity(tape, s)
     add_buoyancy(tape, s)
+    add_explosions(tape, s)
     if tape[H_USER_FORCES] >= 0:
         add_written_forces(tape, s)
 
@@ -74,13 +85,26 @@ def sum_forces(tape, s, skip, part):
         add_drag(tape, s)
 
 
+@inner
+def tell_time(tape, s, share):
+    """The time at which forces are evaluated next: that of the step's start and ``share`` of the step."""
+    now = fma(share, load(s, tape[H_DT]), load(s, tape[H_TIME]))
+    store(s, tape[H_NOW], now)
+
+
+@stage
+def tell_rk4_time(tape, s, skip, part):
+    """The time of each evaluation of the classical Runge-Kutta method."""
+    tell_time(tape, s, splat(0.0 if part == 0 else 1.0 if part == 3 else 0.5))
+
+
 @cache
 def acting_forces(acting):
     """``accumulate_forces`` for the declared kinds alone (``integrators.base.Acting``), which costs what they cost."""
     springs, gravities, buoyancies, written = acting[:4]
     particles_forced = acting.particles_forced
     points, wrenches, applied = acting.points, acting.wrenches, acting.applied
-    thrusts, surfaces = acting.thrusts, acting.surfaces
+    thrusts, surfaces, explosions = acting.thrusts, acting.surfaces, acting.explosions
 
     @inner
     def accumulate(tape, s):
@@ -98,6 +122,8 @@ def acting_forces(acting):
             add_buoyancy(tape, s)
         if written:
             add_written_forces(tape, s)
+        if explosions:
+            add_explosions(tape, s)
         if thrusts:
             add_thrusts(tape, s)
         if surfaces:

@@ -26,11 +26,12 @@ class Acting(NamedTuple):
     applied: bool = False
     thrusts: bool = False
     surfaces: bool = False
+    explosions: bool = False
 
     @property
     def particles_forced(self) -> bool:
         """Whether any is a force whose rows are those of particles."""
-        return self.springs or self.gravities or self.buoyancies or self.written
+        return self.springs or self.gravities or self.buoyancies or self.written or self.explosions
 
     @property
     def summed(self) -> bool:
@@ -58,9 +59,12 @@ class Integrator:
     evaluations: ClassVar[tuple[float | None, ...]] = (0.0,)
     #: Share of the step by which implicit methods reach ahead: their matrix is M - r D - r^2 K with r = reach dt.
     reach: ClassVar[float] = 0.0
-    #: Scratch rows per particle that it works in, and per body.
+    #: Scratch rows that it works in, per particle, beside these, and per body.
     work: ClassVar[int] = 0
+    spare_work: ClassVar[int] = 0
     body_work: ClassVar[int] = 0
+    #: Whether it tells forces the time at which they are evaluated.
+    tells_time: ClassVar[bool] = False
     #: Whether it moves rigid bodies, and turns them by the exact flow of a free rotor.
     moves_bodies: ClassVar[bool] = False
     turns_freely: ClassVar[bool] = False

@@ -10,11 +10,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from ..forces.accumulate import accumulate_forces
+from ..forces.accumulate import accumulate_forces, tell_time
 from ..forces.drag import add_drag
 from ..forces.stiff_spring import flow_stiff_springs
 from ..kernel import inner
-from ..math.lanes import load, store
+from ..math.lanes import load, splat, store
 from ..math.pointers import axes
 from ..model.tape import (
     H_ACCELERATION,
@@ -23,6 +23,7 @@ from ..model.tape import (
     H_FORCE,
     H_FORCED,
     H_INVERSE_MASS,
+    H_NOW,
     H_POSITION,
     H_VELOCITY,
 )
@@ -37,6 +38,7 @@ class ExplicitEuler(Integrator):
     """The source's integrator (see the module)."""
 
     sums_drag: ClassVar[bool] = True
+    tells_time: ClassVar[bool] = True
     solver_stages: ClassVar[tuple[bool, ...]] = (False,)
 
     def recipe(self, solver: Solver | None, acting: Acting) -> Recipe:
@@ -74,6 +76,8 @@ def _integrate(tape, s, dt):
 @stage
 def explicit_euler_step(tape, s, skip, half):
     """Integrate; contacts are resolved afterwards."""
+    if tape[H_NOW] >= 0:
+        tell_time(tape, s, splat(0.0))
     accumulate_forces(tape, s)
     add_drag(tape, s)
     _integrate(tape, s, load(s, tape[H_DT]))

@@ -58,6 +58,7 @@ class KinkRungeKutta4(RungeKutta4):
     evaluations: ClassVar[tuple[float | None, ...]] = ()
     splits: ClassVar[bool] = True
     moves_bodies: ClassVar[bool] = False
+    tells_time: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         checks.whole("KinkRungeKutta4", "kinks", self.kinks, least=1, remedy="Use 4.")

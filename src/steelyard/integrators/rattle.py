@@ -16,7 +16,7 @@ from functools import cache
 from typing import ClassVar
 
 from ..constraints.controls import move_controls
-from ..forces.accumulate import acting_forces
+from ..forces.accumulate import acting_forces, tell_time
 from ..forces.drag import flow_drag
 from ..forces.stiff_spring import flow_stiff_springs
 from ..math.lanes import load, splat
@@ -37,6 +37,7 @@ class Rattle(Integrator):
     evaluations: ClassVar[tuple[float | None, ...]] = (0.0, 1.0)
     solver_stages: ClassVar[tuple[bool, ...]] = (True,)
     moves_bodies: ClassVar[bool] = True
+    tells_time: ClassVar[bool] = True
     turns_freely: ClassVar[bool] = True
 
     def recipe(self, solver: Solver | None, acting: Acting) -> Recipe:
@@ -67,12 +68,15 @@ def rattle_halves(acting: Acting) -> tuple[Stage, Stage]:
     """Both halves for the forces of a scene: up to the drift, and from the new positions on."""
     summed, drags, stiff_springs = acting.summed, acting.drags, acting.stiff_springs
     bodies, loaded, surfaces = acting.bodies, acting.wrenches, acting.surfaces
+    explosions = acting.explosions
     accumulate = acting_forces(acting)
 
     @stage
     def rattle_first_half(tape, s, skip, half):
         """The position stage follows."""
         dt = load(s, tape[H_DT])
+        if explosions:
+            tell_time(tape, s, splat(0.0))
         # Forces of place alone are those that the step before ended with.
         if summed and (surfaces or skip[tape[H_BLOCKS] + FRESH] != 0):
             accumulate(tape, s)
@@ -91,6 +95,8 @@ def rattle_halves(acting: Acting) -> tuple[Stage, Stage]:
     @stage
     def rattle_second_half(tape, s, skip, half):
         """The velocity stage follows."""
+        if explosions:
+            tell_time(tape, s, splat(1.0))
         if summed:
             accumulate(tape, s)
         kick(tape, s, splat(0.5) * load(s, tape[H_DT]))

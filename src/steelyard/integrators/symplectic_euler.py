@@ -12,10 +12,10 @@ from functools import cache
 from typing import ClassVar
 
 from ..constraints.controls import move_controls
-from ..forces.accumulate import acting_forces
+from ..forces.accumulate import acting_forces, tell_time
 from ..forces.drag import flow_drag
 from ..forces.stiff_spring import flow_stiff_springs
-from ..math.lanes import load
+from ..math.lanes import load, splat
 from ..model.tape import H_DT
 from ..solvers.base import Solver
 from ..solvers.stages import begin_step
@@ -31,6 +31,7 @@ class SymplecticEuler(Integrator):
 
     solver_stages: ClassVar[tuple[bool, ...]] = (True, False)
     moves_bodies: ClassVar[bool] = True
+    tells_time: ClassVar[bool] = True
 
     def recipe(self, solver: Solver | None, acting: Acting) -> Recipe:
         """Damp, kick and drift, then the constraints."""
@@ -60,12 +61,14 @@ class SymplecticEuler(Integrator):
 def symplectic_euler_step(acting: Acting) -> Stage:
     """Damp, kick and drift under the forces of a scene; constraints follow."""
     summed, drags, stiff_springs = acting.summed, acting.drags, acting.stiff_springs
-    bodies, loaded = acting.bodies, acting.wrenches
+    bodies, loaded, explosions = acting.bodies, acting.wrenches, acting.explosions
     accumulate = acting_forces(acting)
 
     @stage
     def symplectic_euler_step(tape, s, skip, half):
         dt = load(s, tape[H_DT])
+        if explosions:
+            tell_time(tape, s, splat(0.0))
         if summed:
             accumulate(tape, s)
         if bodies:

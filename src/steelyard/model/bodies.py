@@ -16,6 +16,7 @@ from ..scene.body_forces import (
     Thruster,
     Wrench,
 )
+from ..scene.forces import Explosion
 from ..scene.shapes import rotation_matrix
 from . import derived
 from .parameters import BODIES
@@ -50,6 +51,8 @@ class Bodies:
         for name in _STATE if self.bodies else ():
             values = [getattr(body, name) for body in self.bodies]
             self._rows[name] = self._c.state((BODIES, name), values)
+        for thing in self._c.scene.of(Explosion):
+            self._c.state((thing, "start"), [thing.start])
         for thing in self._c.scene.of(Wrench):
             self._c.state((thing, "force"), thing.force)
             self._c.state((thing, "torque"), thing.torque)
@@ -71,6 +74,12 @@ class Bodies:
     def centre(self, body: Body) -> int:
         """First row of the force through a body's centre of mass."""
         return self.wrench(body) if body.pivot is None else self.point("force", body.at(body.arm))
+
+    def place(self, body: Body) -> int:
+        """First row of the position of a body's centre of mass."""
+        if body.pivot is None:
+            return self.at("position", body)
+        return self.point("position", body.at(body.arm))
 
     def _inverse(self, body: Body) -> int:
         """Rows of the inverse inertia, 0 where the body is immovable."""

@@ -42,7 +42,7 @@ from .tape import (
 )
 
 #: Header fields that are -1, not an empty section, where a scene has no such rows.
-_ABSENT = ("user_forces", "force", "start", "free", "impulse", "dense")
+_ABSENT = ("user_forces", "force", "start", "free", "impulse", "dense", "now")
 
 
 @dataclass
@@ -108,6 +108,7 @@ class Compiler:
             "winches": 3, "movers": 5, "links": LINK, "contacts": CONTACT, "generators": 2,
             "recipe": 2, "unknowns": 4, "spring_blocks": 4, "drag_blocks": 1, "float_blocks": 1,
             "bodies": BODY, "points": BODY_POINT, "wrenched": WRENCHED, "applied": 3, "thrusts": 5, "surfaces": 8,
+            "explosions": 4,
             "propagators": 2, "parts": 2, "compliances": COMPLIANCE, "kinks": KINK,
         }  # fmt: skip
         self.next_row = 0
@@ -405,6 +406,7 @@ class Compiler:
             applied=bool(sections["applied"]),
             thrusts=bool(sections["thrusts"]),
             surfaces=bool(sections["surfaces"]),
+            explosions=bool(sections["explosions"]),
         )
 
     def some(self, chosen: Any) -> list[Particle]:
@@ -437,7 +439,9 @@ class Compiler:
         self.header["repeats"] = getattr(solver, "repeats", 0)
         self.header["tolerance"] = self.constant(getattr(settings, "tolerance", 0.0))
         self.header["active"] = self.take(1) if self.method.integrator.reach > 0.0 else self.one
-        self.header["work"] = self.take(self.method.integrator.work * len(self.particles))
+        integrator = self.method.integrator
+        rows = integrator.work * len(self.particles) + integrator.spare_work
+        self.header["work"] = self.take(rows)
         self.header["constants"] = self._constants()
         if self.saddle is not None:
             self.header["jolt"] = self.take(1)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..forces.explosion import SETTINGS
 from ..forces.springs import ONE_SIDED, REST_ALONE, TWO_SIDED
 from ..scene.body import Body, BodyPoint
 from ..scene.forces import (
@@ -14,6 +15,7 @@ from ..scene.forces import (
     Bungee,
     Buoyancy,
     Drag,
+    Explosion,
     Gravity,
     StiffSpring,
     UserForce,
@@ -44,7 +46,7 @@ def add_forces(c: Compiler) -> None:
     summed_springs = [] if c.compliant else springs_of(scene)
     summed = (
         summed_springs
-        or scene.of(Gravity, Buoyancy, UserForce)
+        or scene.of(Gravity, Buoyancy, Explosion, UserForce)
         or (drags and integrator.sums_drag)
         or (stiff_springs and integrator.smooth and not integrator.linear)
     )
@@ -106,6 +108,7 @@ def add_forces(c: Compiler) -> None:
         p = float_.particle
         y, f = c.at("position", p) + 1, c.at("force", p) + 1
         c.sections["buoyancies"] += [y, f, surface, half, lift]
+    _explosions(c)
     share = integrator.damping_share * c.method.substep
     c.sections["drags"] = []
     for drag in drags:
@@ -143,6 +146,35 @@ def add_forces(c: Compiler) -> None:
             _plain_spring(c, stiff, spare)
         else:
             _stiff_spring(c, stiff)
+
+
+def _explosions(c: Compiler) -> None:
+    explosions = c.scene.of(Explosion)
+    c.header["now"] = c.take(1) if explosions else -1
+    c.sections["explosions"] = []
+    for explosion in explosions:
+        keys = [(explosion, name) for name in ("place", *SETTINGS)]
+        for key in keys:
+            c.parameters.declare(key, getattr(explosion, key[1]))
+
+        def settings(*values: np.ndarray) -> np.ndarray:
+            worlds = max(value.ndim for value in values)
+            if worlds == 1:
+                return np.concatenate(values)
+            width = max(value.shape[1] for value in values if value.ndim == 2)
+            return np.concatenate(
+                [np.broadcast_to(v.reshape(len(v), -1), (len(v), width)) for v in values]
+            )
+
+        rows = c.slot(3 + len(SETTINGS), tuple(keys), settings)
+        start = c.model.places[explosion, "start"][0]
+        chosen: list[Any] = [*c.particles, *c.bodies.bodies]
+        for thing in chosen if explosion.particles is None else explosion.particles:
+            if thing.movable:
+                place = (
+                    c.bodies.place(thing) if isinstance(thing, Body) else c.at("position", thing)
+                )
+                c.sections["explosions"] += [place, c.at("force", thing), rows, start]
 
 
 def _plain_spring(c: Compiler, spring: StiffSpring, spare: int) -> None:

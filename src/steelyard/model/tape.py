@@ -114,8 +114,10 @@ from __future__ import annotations
     H_APPLIED,
     H_THRUSTS,
     H_SURFACES,
-) = range(105)
-HEADER = 105
+    H_EXPLOSIONS,
+    H_NOW,
+) = range(107)
+HEADER = 107
 
 # Width of the records of links, contacts and springs that a solver holds; written field by field.
 LINK = 17

@@ -19,6 +19,7 @@ _SPRING: dict[str, checks.Rule] = {
 }
 _DRAG = checks.Limit(least=0.0, remedy="Less would feed energy in; use 0 for none.")
 _POSITIVE = checks.Limit(above=0.0)
+_NONE_OR_MORE = checks.Limit(least=0.0, remedy="Use 0 for none.")
 
 
 @dataclass(eq=False)
@@ -188,6 +189,69 @@ class Buoyancy:
         checks.numbers(self, *self.LIMITS)
 
 
+@dataclass(eq=False, kw_only=True)
+class Explosion:
+    """An explosion: a pull inwards, then a wave outwards, and hot air that rises (see ``forces.explosion``).
+
+    Each phase acts where its force is above 0. Its edges in time are kinks or jumps: methods have their order between
+    them.
+
+    Args:
+        place: where it happens [m].
+        start: time of the detonation [s]; ``world[explosion].start`` may be assigned, per world.
+        implosion_force: pull [N].
+        implosion_duration: how long [s], before the wave begins.
+        implosion_least: distance below which nothing is pulled [m].
+        implosion_most: and above which [m].
+        wave_force: push at the front of the wave [N].
+        wave_duration: how long it lasts [s], above 0.
+        wave_speed: of the front [m/s], at least 0.
+        wave_thickness: distance from the front at which there is no push [m], above 0.
+        convection_force: lift at the axis [N].
+        convection_duration: how long it lasts [s], above 0.
+        chimney_radius: distance from the axis at which there is no lift [m], above 0.
+        chimney_height: up to which there is [m].
+        particles: particles and bodies that it acts on; all of the scene by default.
+    """
+
+    place: checks.Vector
+    start: float = 0.0
+    implosion_force: float = 0.0
+    implosion_duration: float = 0.0
+    implosion_least: float = 0.0
+    implosion_most: float = 0.0
+    wave_force: float = 0.0
+    wave_duration: float = 1.0
+    wave_speed: float = 340.0
+    wave_thickness: float = 1.0
+    convection_force: float = 0.0
+    convection_duration: float = 1.0
+    chimney_radius: float = 1.0
+    chimney_height: float = 10.0
+    particles: Sequence[Particle | Body] | None = None
+
+    LIMITS: ClassVar[dict[str, checks.Rule]] = {
+        "start": checks.Limit(remedy="Use a time beyond the end for not yet."),
+        "implosion_force": _NONE_OR_MORE,
+        "implosion_duration": _NONE_OR_MORE,
+        "implosion_least": _NONE_OR_MORE,
+        "implosion_most": _NONE_OR_MORE,
+        "wave_force": _NONE_OR_MORE,
+        "wave_duration": _POSITIVE,
+        "wave_speed": _NONE_OR_MORE,
+        "wave_thickness": _POSITIVE,
+        "convection_force": _NONE_OR_MORE,
+        "convection_duration": _POSITIVE,
+        "chimney_radius": _POSITIVE,
+        "chimney_height": _POSITIVE,
+    }
+
+    def __post_init__(self) -> None:
+        checks.vectors(self, "place")
+        checks.numbers(self, *self.LIMITS)
+        check_particles(self, "particles", others=(Body,))
+
+
 @dataclass(eq=False)
 class UserForce:
     """A force written by the user.
@@ -267,5 +331,6 @@ Force = (
     | AnchoredBungee
     | StiffSpring
     | Buoyancy
+    | Explosion
     | UserForce
 )

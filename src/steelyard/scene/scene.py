@@ -17,6 +17,7 @@ from .forces import (
     Bungee,
     Buoyancy,
     Drag,
+    Explosion,
     Gravity,
     Spring,
     StiffSpring,
@@ -38,6 +39,7 @@ FORCES = (
     AnchoredBungee,
     StiffSpring,
     Buoyancy,
+    Explosion,
     UserForce,
 )
 KINDS = (Particle, Body, Rider, *LINKS, *CONTACTS, *FORCES, *BODY_FORCES)
