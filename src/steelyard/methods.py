@@ -82,11 +82,6 @@ class Method:
             raise ValueError(
                 f"{name} cannot step a Body; it steps particles. Use Rattle(), ComposedRattle() or RungeKutta4()."
             )
-        if scene.of(Explosion) and not self.integrator.tells_time:
-            raise ValueError(
-                f"{name} cannot take an Explosion: its force depends on the time, which this method does not tell. Use "
-                "Rattle() or RungeKutta4()."
-            )
         if (
             self.solver is not None
             and self.solver.compliant
@@ -129,6 +124,11 @@ class Method:
             raise ValueError(
                 f"{name} does not work with {type(self.solver).__name__}. "
                 f"Use {self._fitting(self.integrator)} with it."
+            )
+        if scene.of(Explosion) and not self.integrator.tells_time:
+            raise ValueError(
+                f"{name} cannot take an Explosion: its force depends on the time, which this method does not tell. Use "
+                "Rattle() or RungeKutta4()."
             )
         if isinstance(self.solver, Xpbd) and not isinstance(self.integrator, SymplecticEuler):
             raise ValueError(
