@@ -3,9 +3,8 @@
     python -m benchmarks.laboratory.costs
 
 Reads what ``make charts`` measured and writes src/steelyard/costs.json. Kernels work through the index tape, so the
-cost of a step is fitted by a constant, a part per particle, one per word on the tape, one per spring or drag and one
-per part of a body's turn, none negative, with relative errors. Scenes whose contacts are written in Python are left
-out: the calls cost more than the steps.
+cost of a step is fitted by a constant and a part for each kind of work (``Candidate.work``), none negative, with
+relative errors. Scenes whose contacts are written in Python are left out: the calls cost more than the steps.
 """
 
 from __future__ import annotations
@@ -37,12 +36,12 @@ def measured() -> dict[str, list[tuple[float, ...]]]:
                 kinked = candidate.integrator.divisions > 0 and candidate.solver is None
                 events = sy.kinks_per_second(scene, problem.duration) if kinked else 0.0
                 costs: dict[tuple[float, ...], list[float]] = {}
-                words = sy.World(scene, method=candidate.at(problem.stretch / 8.0)).model.words
+                model = sy.World(scene, method=candidate.at(problem.stretch / 8.0)).model
                 for point in found[problem.name]["points"]:
                     alike = point["method"] == candidate.name and point["worlds"] > 1
                     if alike and point["per_second"]:
                         dt = point["dt"]
-                        work = candidate.work(scene, words, dt)
+                        work = candidate.work(scene, model, dt)
                         cost = point["per_second"] * dt / candidate.runs(events * dt)
                         costs.setdefault(work, []).append(cost)
                 for work, found_costs in costs.items():
@@ -65,8 +64,8 @@ def main() -> None:
     fits = {name: fit(rows[name]) for name in sorted(rows)}
     payload = {
         "source": "python -m benchmarks.laboratory.costs, from benchmarks/results/charts",
-        "units": "us per step and world: constant, per particle, per word on the tape, per spring or drag, "
-        "per part of a body's turn",
+        "units": "us per step and world: constant, per particle, per word on the tape, per spring, per drag, "
+        "per part of a body's turn, per KiB of scratch that the nearest cache does not hold",
         "coefficients": {name: coefficients for name, (coefficients, _) in fits.items()},
         "relative_error": {name: error for name, (_, error) in fits.items()},
     }

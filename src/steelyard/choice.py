@@ -43,16 +43,13 @@ from .scene import checks
 from .scene.contacts import Collisions, Ground, LinePlatform
 from .scene.forces import (
     AnchoredBungee,
-    AnchoredSpring,
     Bungee,
     Buoyancy,
     Drag,
-    Spring,
-    StiffSpring,
 )
 from .scene.links import Cable, CableConstraint
 from .scene.rider import Rider
-from .scene.scene import CONTACTS, LINKS, Scene
+from .scene.scene import CONTACTS, LINKS, SPRINGS, Scene
 from .solvers.base import Solver
 from .solvers.direct import Direct
 from .solvers.gauss_seidel import GaussSeidel
@@ -60,6 +57,7 @@ from .solvers.worst_first import WorstFirst
 from .solvers.xpbd import Xpbd
 
 if TYPE_CHECKING:
+    from .model.compile import Model
     from .world import World
 
 
@@ -93,13 +91,14 @@ class Candidate:
         turns = (1.0 - np.cumsum(chances) ** LANES).sum()
         return 1.0 + 3.0 * float(turns)
 
-    def work(self, scene: Scene, words: int, dt: float) -> tuple[float, ...]:
-        """What a step's cost is made of: 1, particles, words on the tape, springs and drags, parts of bodies' turns.
+    def work(self, scene: Scene, model: Model, dt: float) -> tuple[float, ...]:
+        """What a step's cost is made of.
 
-        Kernels work through the tape, but a force with a root and a division is dearer than its words. Bodies that turn
-        freely do so in parts, the more the faster they spin and the longer the step.
+        That is 1, particles, words on the tape, springs, drags, parts of bodies' turns, and KiB of scratch beyond
+        ``_NEAR``. Kernels work through the tape, but a force with a root and a division is dearer than its words. Bodies
+        that turn freely do so in parts, the more the faster they spin and the longer the step.
         """
-        springs = scene.of(Spring, Bungee, AnchoredSpring, AnchoredBungee, StiffSpring)
+        springs = scene.of(*SPRINGS)
         drags = sum(
             len(scene.particles if drag.particles is None else drag.particles)
             for drag in scene.of(Drag)
@@ -112,7 +111,9 @@ class Candidate:
             for body in scene.bodies
             if body.movable
         )
-        return tuple(map(float, (1, len(scene.particles), words, len(springs) + drags, turns)))
+        far = max(model.rows * LANES * 8 / 1024 - _NEAR, 0.0)
+        counts = (1, len(scene.particles), model.words, len(springs), drags, turns, far)
+        return tuple(map(float, counts))
 
 
 #: What is measured, charted and chosen from.
@@ -169,6 +170,8 @@ _KINKS = (Bungee, AnchoredBungee, Buoyancy, Cable, CableConstraint, *CONTACTS)
 _TRIES = 12
 #: Looks at which kinks are counted.
 _SAMPLES = 1_000
+#: Scratch [KiB] that the nearest cache holds, about: what is beyond costs more.
+_NEAR = 48.0
 #: Error from which on a run has blown up.
 _LOST = 1e3
 #: Most by which the number of steps grows from one try to the next.
@@ -276,7 +279,7 @@ class _Runs:
         self.events = 0.0
         self._world: type[World] = World
         self._tracks: dict[tuple[int, int], _Track | None] = {}
-        self._words = self._build(_LOOKS).model.words
+        self._model = self._build(_LOOKS).model
 
     def dt(self, steps: int) -> float:
         """Step [s] of a run of so many."""
@@ -286,7 +289,7 @@ class _Runs:
         """Expected cost [us per simulated second and world]."""
         dt = self.dt(steps)
         each = cost_table()[self.candidate.name]
-        step = sum(map(mul, each, self.candidate.work(self._scene, self._words, dt)))
+        step = sum(map(mul, each, self.candidate.work(self._scene, self._model, dt)))
         return step * self.candidate.runs(self.events * dt) / dt
 
     def _build(self, steps: int) -> World:
