@@ -95,8 +95,8 @@ class Candidate:
         """What a step's cost is made of.
 
         That is 1, particles, words on the tape, springs, drags, parts of bodies' turns, and KiB of scratch beyond
-        ``_NEAR``. Kernels work through the tape, but a force with a root and a division is dearer than its words. Bodies
-        that turn freely do so in parts, the more the faster they spin and the longer the step.
+        ``_NEAR``. Kernels work through the tape, but a force with a root and a division is dearer than its words.
+        Bodies that turn freely do so in parts, the more the faster they spin and the longer the step.
         """
         springs = scene.of(*SPRINGS)
         drags = sum(
