@@ -284,6 +284,33 @@ def test_damping_takes_speed_and_spin(integrator: Any) -> None:
     )
 
 
+@_over([sy.Rattle(), sy.RungeKutta4(), sy.SymplecticEuler()])
+def test_drag_takes_a_body_as_it_takes_a_particle(integrator: Any) -> None:
+    scene = sy.Scene()
+    start = {"velocity": (20.0, 5.0, 0.0), "mass": 3.0}
+    body = scene.add(
+        sy.Body(position=(0, 0, 0), inertia=(1, 2, 3), angular_velocity=(0, 2, 0), **start)
+    )
+    scene.add(sy.Particle(position=(0, 0, 0), **start))
+    scene.add(sy.Drag(linear=0.3, quadratic=0.05, wind=(-2.0, 0.0, 1.0)))
+    world = sy.World(scene, worlds=2, method=sy.Method(integrator, dt=0.01))
+    spin = world.bodies.angular_momentum.copy()
+    world.step(100)
+    places = world.bodies.position[:, 0], world.particles.position[:, 0]
+    np.testing.assert_allclose(*places, rtol=1e-12)
+    assert abs(places[0][0, 0]) < 19.0
+    np.testing.assert_allclose(world.bodies.angular_momentum, spin, rtol=1e-3)
+    world.bodies.mass = [[3.0], [300.0]]
+    world.step(10)
+    assert world.bodies.velocity[1, 0, 0] > world.bodies.velocity[0, 0, 0]
+    held = sy.Scene()
+    held.add(sy.Body(position=(0, 0, 0), inertia=(1, 1, 1), pivot=(0, -1, 0)))
+    held.add(sy.Drag(linear=1.0))
+    with pytest.raises(ValueError, match=r"Drag on a body with a pivot.*angular_damping"):
+        sy.World(held)
+    assert body in scene
+
+
 def test_an_impulse_off_centre_changes_both_momenta() -> None:
     scene = sy.Scene(gravity=(0, 0, 0))
     body = scene.add(

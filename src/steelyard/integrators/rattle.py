@@ -80,13 +80,13 @@ def rattle_halves(acting: Acting) -> tuple[Stage, Stage]:
         # Forces of place alone are those that the step before ended with.
         if summed and (surfaces or skip[tape[H_BLOCKS] + FRESH] != 0):
             accumulate(tape, s)
+        damp(tape, s)
+        if drags:
+            flow_drag(tape, s, False)
         if bodies:
             damp_bodies(tape, s)
             kick_bodies(tape, s, splat(0.5) * dt, loaded)
             drift_bodies(tape, s, dt)
-        damp(tape, s)
-        if drags:
-            flow_drag(tape, s, False)
         kick(tape, s, splat(0.5) * dt)
         drift(tape, s, dt)
         if stiff_springs:

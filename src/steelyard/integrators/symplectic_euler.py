@@ -71,14 +71,14 @@ def symplectic_euler_step(acting: Acting) -> Stage:
             tell_time(tape, s, splat(0.0))
         if summed:
             accumulate(tape, s)
+        damp(tape, s)
+        if drags:
+            flow_drag(tape, s, False)
         if bodies:
             damp_bodies(tape, s)
             kick_bodies(tape, s, dt, loaded)
             turn_implicitly(tape, s, dt)
             flag_nonfinite_bodies(tape, s)
-        damp(tape, s)
-        if drags:
-            flow_drag(tape, s, False)
         kick(tape, s, dt)
         drift(tape, s, dt)
         if stiff_springs:

@@ -23,7 +23,7 @@ from ..scene.forces import (
 from ..scene.particle import Particle
 from . import derived
 from .compliances import springs_of
-from .parameters import PARTICLES
+from .parameters import BODIES, PARTICLES
 
 if TYPE_CHECKING:
     from .compile import Compiler
@@ -115,12 +115,14 @@ def add_forces(c: Compiler) -> None:
         linear = c.parameter(drag, "linear", drag.linear)
         quadratic = c.parameter(drag, "quadratic", drag.quadratic)
         wind = c.parameter(drag, "wind", drag.wind)
-        for p in c.some(drag.particles):
+        everything: list[Any] = [*c.particles, *c.bodies.bodies]
+        for p in everything if drag.particles is None else drag.particles:
             if p.movable:
-                index = c.of(p)
+                whole = isinstance(p, Body)
+                index = c.bodies.index[id(p)] if whole else c.of(p)
                 flow = c.slot(
                     2,
-                    ((drag, "linear"), (PARTICLES, "inverse_mass")),
+                    ((drag, "linear"), (BODIES if whole else PARTICLES, "inverse_mass")),
                     lambda k1, inverse, i=index: derived.drag(k1, inverse[i : i + 1], share)[:, 0],
                 )
                 f = c.at("force", p) if force >= 0 else -1
@@ -130,8 +132,9 @@ def add_forces(c: Compiler) -> None:
                     c.linear.setdefault(index, []).append((drag, "linear", False))
                     c.sections["gravities"] += [f, linear, wind]
                     brake = c.zero
+                velocity = c.bodies.at("velocity", p) if whole else c.at("velocity", p)
                 c.sections["drags"] += [
-                    c.at("velocity", p), f, brake, quadratic, wind, flow, flow + 1,
+                    velocity, f, brake, quadratic, wind, flow, flow + 1,
                 ]  # fmt: skip
     c.sections["stiff_springs"] = []
     for stiff in stiff_springs:

@@ -47,24 +47,26 @@ class Gravity:
 class Drag:
     """F = -(k1 |u| + k2 |u|^2) u/|u| with u the velocity relative to the wind.
 
+    On a body it acts at the centre of mass and turns nothing; a body with a pivot takes none.
+
     Args:
         linear: k1 [N s/m], at least 0.
         quadratic: k2 [N s^2/m^2], at least 0.
         wind: velocity of the air [m/s].
-        particles: those it acts on; all of the scene by default.
+        particles: particles and bodies that it acts on; all of the scene by default.
     """
 
     linear: float = 0.0
     quadratic: float = 0.0
     wind: checks.Vector = (0.0, 0.0, 0.0)
-    particles: Sequence[Particle] | None = None
+    particles: Sequence[Particle | Body] | None = None
 
     LIMITS: ClassVar[dict[str, checks.Rule]] = {"linear": _DRAG, "quadratic": _DRAG}
 
     def __post_init__(self) -> None:
         checks.numbers(self, "linear", "quadratic")
         checks.vectors(self, "wind")
-        check_particles(self, "particles")
+        check_particles(self, "particles", others=(Body,))
 
 
 @dataclass(eq=False)

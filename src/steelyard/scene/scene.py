@@ -159,12 +159,19 @@ class Scene:
 
         Raises:
             ValueError: neither particle nor body, a line platform that one of its particles can never touch, collisions
-                of none, or contacts of everything in a scene with bodies.
+                of none, drag on a body with a pivot, or contacts of everything in a scene with bodies.
         """
         if not self.particles and not self.bodies:
             raise ValueError(
                 "Scene: the scene has 0 particles; it must have at least 1, or a body. Add a Particle."
             )
+        for drag in self.of(Drag):
+            chosen = self.bodies if drag.particles is None else drag.particles
+            if any(isinstance(thing, Body) and thing.pivot is not None for thing in chosen):
+                raise ValueError(
+                    "Scene: a Drag on a body with a pivot, which does not move; it takes none. Name the others "
+                    "(Drag(particles=[...])), and give the body angular_damping."
+                )
         if any(body.movable for body in self.bodies):
             for contact in self.of(Ground, LinePlatform, Collisions):
                 if contact.particles is None:
