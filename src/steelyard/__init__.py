@@ -1,15 +1,8 @@
 """Steelyard: a batched physics engine that lets you weigh speed against accuracy."""
 
 from . import draw, extension, scenes
-from .choice import (
-    CANDIDATES,
-    Candidate,
-    Choice,
-    Considered,
-    candidates,
-    choose_method,
-    kinks_per_second,
-)
+from .candidates import CANDIDATES, Candidate, candidates, kinks_per_second
+from .choice import Choice, Considered, choose_method
 from .diagnostics.landmarks import landmarks
 from .integrators.backward_euler import BackwardEuler
 from .integrators.closed_form import ClosedForm, flight, flight_fall_time, flight_impact

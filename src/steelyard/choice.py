@@ -1,147 +1,31 @@
 """The method that a scene needs: the cheapest that holds a tolerance, tried on the scene itself.
 
-What a step costs comes from a table that the laboratory measured (``costs.json``: a linear fit over the particles and
-the words on the index tape, which kernels work through). What a step errs by is measured on the scene: a run is
-compared with a reference, which is the run of the method of highest order that halving the step no longer changes.
+What a step costs comes from a table that the laboratory measured (``costs.json``, see ``candidates``). What a step errs
+by is measured on the scene: a run is compared with a reference, which is the run of the method of highest order that
+halving the step no longer changes.
 """
 
 from __future__ import annotations
 
-import json
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass, field
-from functools import cache
-from importlib.resources import files
 from itertools import count
 from operator import mul
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .candidates import Candidate, candidates, cost_table, kinks_per_second
 from .diagnostics.energy import kinetic_energy
-from .diagnostics.kinks import kink_sides
 from .diagnostics.landmarks import landmarks
-from .integrators.backward_euler import BackwardEuler
-from .integrators.base import Integrator
-from .integrators.closed_form import ClosedForm
-from .integrators.composed_rattle import ComposedRattle
-from .integrators.explicit_euler import ExplicitEuler
-from .integrators.exponential import ExponentialRungeKutta
-from .integrators.generalised_alpha import GeneralisedAlpha
-from .integrators.impact_rattle import ImpactRattle
-from .integrators.implicit_midpoint import ImplicitMidpoint
-from .integrators.kink_rk4 import KinkRungeKutta4
-from .integrators.linearly_implicit import LinearlyImplicit
-from .integrators.rattle import Rattle
-from .integrators.rk4 import RungeKutta4
-from .integrators.rotor import parts_of
-from .integrators.symplectic_euler import SymplecticEuler
-from .math.pointers import LANES
 from .methods import Method
 from .scene import checks
-from .scene.contacts import Collisions, Ground, LinePlatform
-from .scene.forces import (
-    AnchoredBungee,
-    Bungee,
-    Buoyancy,
-    Drag,
-)
+from .scene.forces import AnchoredBungee, Bungee, Buoyancy
 from .scene.links import Cable, CableConstraint
-from .scene.rider import Rider
-from .scene.scene import CONTACTS, LINKS, SPRINGS, Scene
-from .solvers.base import Solver
-from .solvers.direct import Direct
-from .solvers.gauss_seidel import GaussSeidel
-from .solvers.worst_first import WorstFirst
-from .solvers.xpbd import Xpbd
+from .scene.scene import CONTACTS, Scene
 
 if TYPE_CHECKING:
-    from .model.compile import Model
     from .world import World
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """A method at any step.
-
-    Attributes:
-        name: what charts and tables call it.
-        integrator: how it advances.
-        solver: what holds links and contacts; None for scenes without any.
-    """
-
-    name: str
-    integrator: Integrator
-    solver: Solver | None = None
-
-    def at(self, dt: float) -> Method:
-        """The method with a step [s]."""
-        return Method(self.integrator, self.solver, dt=dt)
-
-    def runs(self, events: float) -> float:
-        """How often a block of worlds runs through its step, with so many events in it that divide it.
-
-        Each takes two trials and a part of the step, until the world of the block that meets most of them is through.
-        """
-        most = self.integrator.divisions
-        if events <= 0.0 or most == 0:
-            return 1.0
-        chances = np.exp(-events) * np.cumprod([1.0, *(events / k for k in range(1, most))])
-        turns = (1.0 - np.cumsum(chances) ** LANES).sum()
-        return 1.0 + 3.0 * float(turns)
-
-    def work(self, scene: Scene, model: Model, dt: float) -> tuple[float, ...]:
-        """What a step's cost is made of.
-
-        That is 1, particles, words on the tape, springs, drags, parts of bodies' turns, and KiB of scratch beyond
-        ``_NEAR``. Kernels work through the tape, but a force with a root and a division is dearer than its words.
-        Bodies that turn freely do so in parts, the more the faster they spin and the longer the step.
-        """
-        springs = scene.of(*SPRINGS)
-        drags = sum(
-            len(scene.particles if drag.particles is None else drag.particles)
-            for drag in scene.of(Drag)
-        )
-        longest = dt * max(map(abs, self.integrator.fractions))
-        turns = sum(
-            parts_of(body.angular_momentum, np.asarray(body.inertia), longest)
-            if self.integrator.turns_freely
-            else 1
-            for body in scene.bodies
-            if body.movable
-        )
-        far = max(model.rows * LANES * 8 / 1024 - _NEAR, 0.0)
-        counts = (1, len(scene.particles), model.words, len(springs), drags, turns, far)
-        return tuple(map(float, counts))
-
-
-#: What is measured, charted and chosen from.
-CANDIDATES = (
-    Candidate("explicit Euler", ExplicitEuler()),
-    Candidate("symplectic Euler", SymplecticEuler()),
-    Candidate("velocity Verlet", Rattle()),
-    Candidate("RK4", RungeKutta4()),
-    Candidate("RK4, kinks inside", KinkRungeKutta4()),
-    Candidate("exponential", ExponentialRungeKutta()),
-    Candidate("linearly implicit", LinearlyImplicit()),
-    Candidate("backward Euler", BackwardEuler()),
-    Candidate("implicit midpoint", ImplicitMidpoint()),
-    Candidate("closed form", ClosedForm()),
-    Candidate("velocity Verlet, order 4", ComposedRattle()),
-    Candidate("velocity Verlet, order 6", ComposedRattle(substeps=9)),
-    Candidate("RATTLE, direct", Rattle(), Direct()),
-    Candidate("RATTLE, impacts inside, direct", ImpactRattle(), Direct()),
-    Candidate("RATTLE of order 4, direct", ComposedRattle(), Direct()),
-    Candidate("RATTLE of order 6, direct", ComposedRattle(substeps=9), Direct()),
-    Candidate("generalised-alpha", GeneralisedAlpha()),
-    Candidate("RATTLE, Gauss-Seidel x 4", Rattle(), GaussSeidel(passes=4)),
-    Candidate("RATTLE, Gauss-Seidel x 16", Rattle(), GaussSeidel(passes=16)),
-    Candidate("RATTLE, Gauss-Seidel x 64", Rattle(), GaussSeidel(passes=64)),
-    Candidate("symplectic Euler, direct", SymplecticEuler(), Direct()),
-    Candidate("XPBD x 20", SymplecticEuler(), Xpbd(substeps=20)),
-    Candidate("explicit Euler, worst first", ExplicitEuler(), WorstFirst()),
-)
 
 
 @dataclass(frozen=True)
@@ -163,29 +47,16 @@ _LOOKS = 20
 _MOST = 400_000
 #: Share of the tolerance that the reference may err by.
 _REFERENCE = 0.04
-
 _SMOOTH = _Margin(0.88, 0.96, (1.07, 1.19, 1.37))
 _KINKED = _Margin(0.75, 0.9, (1.03, 1.07, 1.11, 1.15, 1.19, 1.24, 1.3, 1.37))
 _KINKS = (Bungee, AnchoredBungee, Buoyancy, Cable, CableConstraint, *CONTACTS)
 _TRIES = 12
-#: Looks at which kinks are counted.
-_SAMPLES = 1_000
-#: Scratch [KiB] that the nearest cache holds, about: what is beyond costs more.
-_NEAR = 48.0
 #: Error from which on a run has blown up.
 _LOST = 1e3
 #: Most by which the number of steps grows from one try to the next.
 _FARTHEST = 64.0
 #: Height [m] whose energy is the least that errors of energy are held against: what rests has no other.
 _LIFT = 1e-3
-
-
-@cache
-def cost_table() -> dict[str, list[float]]:
-    """Cost per step and world [us] by method: what each part of ``Candidate.work`` costs."""
-    text = files("steelyard").joinpath("costs.json").read_text()
-    table: dict[str, list[float]] = json.loads(text)["coefficients"]
-    return table
 
 
 @dataclass(frozen=True)
@@ -377,37 +248,6 @@ def _whole(steps: float) -> int:
     """So many steps or a few more, so that looks at them are evenly spaced."""
     least = max(math.ceil(steps), _LOOKS)
     return next(whole for whole in count(least) if _down(whole) == whole)
-
-
-def candidates(scene: Scene) -> Iterator[Candidate]:
-    """The candidates that can step a scene; with a solver, or with events resolved, only where there may be any."""
-    impacts = bool(scene.of(Cable, CableConstraint, Ground, LinePlatform, Collisions))
-    kinks = bool(scene.of(Bungee, AnchoredBungee, Buoyancy))
-    held = bool(scene.of(*LINKS, *CONTACTS, Rider))
-    for candidate in CANDIDATES:
-        holds = candidate.solver is not None or candidate.integrator.holds_links
-        dividing = kinks if candidate.integrator.smooth else impacts
-        if held == holds and (dividing or not candidate.integrator.splits):
-            try:
-                candidate.at(1.0).refuse(scene)
-            except ValueError:
-                continue
-            yield candidate
-
-
-def kinks_per_second(scene: Scene, horizon: float) -> float:
-    """How often forces of a scene have a kink, over the horizon [s] from its start; 0 where that cannot be followed."""
-    from .world import World
-
-    method = Method(RungeKutta4(), dt=horizon / _SAMPLES)
-    world = World(scene, method=method)
-    sides = kink_sides(world)
-    count = 0
-    for _ in range(_SAMPLES):
-        world.step()
-        before, sides = sides, kink_sides(world)
-        count += int((sides != before).sum())
-    return 0.0 if world.health[0] else count / horizon
 
 
 def _reference(runs: list[_Runs], start: int, tolerance: float) -> _Reference:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import steelyard as sy
-from steelyard.choice import cost_table
+from steelyard.candidates import cost_table
 
 G = 9.81
 
