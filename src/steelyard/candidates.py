@@ -30,12 +30,7 @@ from .integrators.symplectic_euler import SymplecticEuler
 from .math.pointers import LANES
 from .methods import Method
 from .scene.contacts import Collisions, Ground, LinePlatform
-from .scene.forces import (
-    AnchoredBungee,
-    Bungee,
-    Buoyancy,
-    Drag,
-)
+from .scene.forces import AnchoredBungee, Bungee, Buoyancy, Drag
 from .scene.links import Cable, CableConstraint
 from .scene.rider import Rider
 from .scene.scene import CONTACTS, LINKS, SPRINGS, Scene
@@ -92,9 +87,9 @@ class Candidate:
         Bodies that turn freely do so in parts, the more the faster they spin and the longer the step.
         """
         springs = scene.of(*SPRINGS)
+        everything = [*scene.particles, *scene.bodies]
         drags = sum(
-            len(scene.particles if drag.particles is None else drag.particles)
-            for drag in scene.of(Drag)
+            len(everything if drag.particles is None else drag.particles) for drag in scene.of(Drag)
         )
         longest = dt * max(map(abs, self.integrator.fractions))
         turns = sum(

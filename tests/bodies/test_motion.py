@@ -79,7 +79,7 @@ def test_without_the_gyroscopic_term_a_top_would_not_turn_over() -> None:
 
 @_over(MOVING)
 def test_order_on_a_free_top(integrator: Any) -> None:
-    """Methods that turn freely are exact; the others have their order, that of RK4 seen from its own small steps."""
+    """Methods that turn freely are exact; the others have their order."""
     spin = np.array([0.3, 2.0, 1.0])
     errors = []
     for steps in (120, 240):
@@ -288,9 +288,7 @@ def test_damping_takes_speed_and_spin(integrator: Any) -> None:
 def test_drag_takes_a_body_as_it_takes_a_particle(integrator: Any) -> None:
     scene = sy.Scene()
     start = {"velocity": (20.0, 5.0, 0.0), "mass": 3.0}
-    body = scene.add(
-        sy.Body(position=(0, 0, 0), inertia=(1, 2, 3), angular_velocity=(0, 2, 0), **start)
-    )
+    scene.add(sy.Body(position=(0, 0, 0), inertia=(1, 2, 3), angular_velocity=(0, 2, 0), **start))
     scene.add(sy.Particle(position=(0, 0, 0), **start))
     scene.add(sy.Drag(linear=0.3, quadratic=0.05, wind=(-2.0, 0.0, 1.0)))
     world = sy.World(scene, worlds=2, method=sy.Method(integrator, dt=0.01))
@@ -308,7 +306,6 @@ def test_drag_takes_a_body_as_it_takes_a_particle(integrator: Any) -> None:
     held.add(sy.Drag(linear=1.0))
     with pytest.raises(ValueError, match=r"Drag on a body with a pivot.*angular_damping"):
         sy.World(held)
-    assert body in scene
 
 
 def test_an_impulse_off_centre_changes_both_momenta() -> None:

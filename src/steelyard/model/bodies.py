@@ -32,7 +32,7 @@ class Bodies:
 
     Attributes:
         bodies: all of them, in order.
-        damped: whether any loses speed by itself.
+        index: place of each among them, by identity.
     """
 
     def __init__(self, c: Compiler) -> None:
@@ -173,7 +173,7 @@ class Bodies:
     def finish(self) -> None:
         """Records of points and bodies; parameters of bodies."""
         c = self._c
-        c.header["rotor"] = c.header["bodies_damped"] = -1
+        c.header["rotor"], c.header["bodies_damped"] = -1, 0
         if not self.bodies:
             return
         self._declare()
