@@ -49,6 +49,7 @@ from .scene.scene import Scene
 from .scene.shapes import Box, Capsule, Hollow, Part, Sphere
 from .solvers.direct import Direct
 from .solvers.gauss_seidel import GaussSeidel
+from .solvers.proximal_newton import ProximalNewton
 from .solvers.worst_first import WorstFirst
 from .solvers.xpbd import Xpbd
 from .stepping import advance
@@ -95,6 +96,7 @@ __all__ = [
     "Method",
     "Part",
     "Particle",
+    "ProximalNewton",
     "Rattle",
     "Rider",
     "Rod",

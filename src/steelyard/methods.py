@@ -12,7 +12,7 @@ from .integrators.rk4 import RungeKutta4
 from .integrators.symplectic_euler import SymplecticEuler
 from .scene import checks
 from .scene.body_forces import SURFACES
-from .scene.contacts import ContactGenerator
+from .scene.contacts import Collisions, ContactGenerator, Ground, LinePlatform
 from .scene.forces import Drag, Explosion, StiffSpring, UserForce
 from .scene.links import Cable, CableConstraint
 from .scene.rider import Rider
@@ -20,6 +20,7 @@ from .scene.scene import CONTACTS, FORCES, LINKS, SPRINGS, Scene
 from .solvers.base import Solver
 from .solvers.direct import Direct
 from .solvers.gauss_seidel import GaussSeidel
+from .solvers.proximal_newton import ProximalNewton
 from .solvers.worst_first import WorstFirst
 from .solvers.xpbd import Xpbd
 
@@ -92,6 +93,7 @@ class Method:
                 f"{type(self.solver).__name__} cannot hold a {type(scene.of(*SPRINGS)[0]).__name__} in a scene with "
                 "bodies, whose points it does not know. Use Rattle()."
             )
+        self._refuse_bodies(name, scene)
         if isinstance(self.integrator, ClosedForm):
             other = held or scene.of(*FORCES)
             if other:
@@ -159,6 +161,27 @@ class Method:
                 "ExplicitEuler cannot drive a winch. Use SymplecticEuler() or Rattle()."
             )
 
+    def _refuse_bodies(self, name: str, scene: Scene) -> None:
+        """Raise if contacts of bodies have no solver, or a solver of these something else to hold."""
+        rigid = self.solver is not None and self.solver.rigid
+        solver = type(self.solver).__name__
+        if not rigid:
+            for contact in scene.of(Ground, Collisions):
+                if scene.bodies_at(contact):
+                    raise ValueError(
+                        f"{name} with {solver} cannot hold a {type(contact).__name__} that meets a Body; it knows "
+                        "contacts of particles. Use Method(Rattle(), ProximalNewton()), or name the particles "
+                        f"({type(contact).__name__}(particles=[...]))."
+                    )
+            return
+        if not isinstance(self.integrator, Rattle):
+            raise ValueError(f"{name} does not work with {solver}. Use Rattle() with it.")
+        for thing in scene.of(*LINKS, Rider, LinePlatform, ContactGenerator):
+            raise ValueError(
+                f"{solver} cannot hold a {type(thing).__name__}; it knows contacts with grounds and of bodies and "
+                "particles among themselves. Use Direct() where no body touches anything."
+            )
+
     def _refuse_beside_links(self, name: str, scene: Scene) -> None:
         """Raise if an integrator that holds links by itself cannot do the rest of a scene."""
         if self.solver is not None:
@@ -207,6 +230,15 @@ class Method:
 
 
 DEFAULT = Method(Rattle(), Direct())
+#: Where bodies touch something.
+DEFAULT_RIGID = Method(Rattle(), ProximalNewton())
+
+
+def default_for(scene: Scene) -> Method:
+    """The method of a world that is given none."""
+    touching = any(scene.bodies_at(contact) for contact in scene.of(Ground, Collisions))
+    return DEFAULT_RIGID if touching else DEFAULT
+
 
 __all__ = [
     "DEFAULT",
@@ -215,6 +247,7 @@ __all__ = [
     "ExplicitEuler",
     "GaussSeidel",
     "Method",
+    "ProximalNewton",
     "Rattle",
     "RungeKutta4",
     "SymplecticEuler",

@@ -23,6 +23,7 @@ from .math.pointers import (
     tape_at,
 )
 from .model.tape import (
+    COUNT,
     FRESH,
     H_BLOCKS,
     H_DIVISIONS,
@@ -177,6 +178,7 @@ def _advance_blocks(launch, s, first, last, substeps, phase):
         _load_block(tape, s, state, given, given_rows, launch[L_GIVEN_COUNT], width, picked, whole)
         store(s, tape[H_GIVEN_UP], splat(0.0))
         skip[words + HASTY] = 1 if hasty else 0
+        skip[words + COUNT] = count
         for substep in range(substeps):
             skip[words + FRESH] = 1 if substep == 0 else 0
             _step(tape, s, skip, phase)

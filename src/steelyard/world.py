@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 
 from .choice import Choice, choose_method
+from .diagnostics.contacts import Contacts, contacts_of
 from .diagnostics.energy import world_energy
 from .diagnostics.health import health_flags
 from .diagnostics.residual import link_residuals
 from .math.pointers import LANES
-from .methods import DEFAULT, Method
+from .methods import Method, default_for
 from .model.compile import Model, compile_model
 from .model.parameters import BODIES, PARTICLES, Key
 from .model.tape import H_BODIES_DAMPED, H_DAMPED
@@ -86,7 +87,7 @@ class World:
             self._choice = choose_method(scene, tolerance=tolerance, horizon=horizon)
             method = self._choice.method
         elif method is None:
-            method = DEFAULT
+            method = default_for(scene)
         checks.instance("World", "method", method, Method, remedy="Use Method(Rattle(), Direct()).")
         self._worlds = checks.whole("World", "worlds", worlds, least=1, remedy="Use one.")
         self._threads = checks.whole("World", "threads", threads, least=1, remedy="Use one.")
@@ -325,7 +326,8 @@ class World:
 
         1: non-finite. 2: constraints missed their tolerance. Both stay until ``reset`` or
         ``restore``; a non-finite world goes on stepping as NaN and touches no other. 4: out of
-        range, as long as the length of a winch is not above 0.
+        range, as long as the length of a winch is not above 0. 8: more contacts than the buffer holds, of
+        which the deepest were kept; stays as 1 and 2 do (give the solver more: ``ProximalNewton(contacts=...)``).
         """
         return health_flags(self)
 
@@ -358,6 +360,15 @@ class World:
     def residual(self) -> np.ndarray:
         """Violation of every link over its length, (worlds, links); slack cables count 0."""
         return link_residuals(self)
+
+    @property
+    def contacts(self) -> Contacts:
+        """What touches what, and with which force, after the last step, of scenes with contacts of bodies.
+
+        Raises:
+            ValueError: this world's method keeps no list of contacts.
+        """
+        return contacts_of(self)
 
     # State
 

@@ -480,8 +480,8 @@ def test_methods_that_know_no_bodies_refuse_them() -> None:
 
 def test_what_bodies_cannot_do_yet_is_refused() -> None:
     scene = top()
-    scene.add(sy.Ground())
-    with pytest.raises(ValueError, match=r"bodies would pass through it.*Ground\(particles="):
+    scene.add(sy.LinePlatform(start=(0, 0, 0), end=(1, 0, 0), radius=0.1))
+    with pytest.raises(ValueError, match=r"bodies would pass through it.*LinePlatform\(particles="):
         sy.World(scene)
     body = sy.Body(position=(0, 0, 0), parts=sy.Sphere(1.0))
     with pytest.raises(ValueError, match="cannot be in a planar scene"):

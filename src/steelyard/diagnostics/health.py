@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..model.parameters import PARTICLES
+from ..model.parameters import PARTICLES, RIGID
 
 if TYPE_CHECKING:
     from ..world import World
 
-NONFINITE, UNSETTLED, OUT_OF_RANGE = 1, 2, 4
+NONFINITE, UNSETTLED, OUT_OF_RANGE, OVERFLOW = 1, 2, 4, 8
 
 
 def health_flags(world: World) -> np.ndarray:
@@ -23,4 +23,6 @@ def health_flags(world: World) -> np.ndarray:
         if name == "length":
             wound_up = ~(world._view(thing, name)[:, 0] > 0.0)
             flags |= OUT_OF_RANGE * wound_up
+    if (RIGID, "overflow") in world.model.places:
+        flags |= OVERFLOW * (world._view(RIGID, "overflow")[:, 0] > 0.0)
     return flags.astype(np.uint8)

@@ -45,6 +45,11 @@ class Rattle(Integrator):
         first, second = rattle_halves(acting)
         if solver is None:
             return ((first, 0), (second, 1))
+        if solver.rigid:
+            kicked, drifted = rattle_parts(acting)
+            return (
+                (solver.start, 0), (kicked, 0), (solver.stage, 0), (drifted, 0), (second, 1), (solver.stage, 1)
+            )  # fmt: skip
         return (
             (begin_step, 0),
             (move_controls, 0),
@@ -61,6 +66,40 @@ class Rattle(Integrator):
     def stable_limit(self) -> float:
         """Stable while dt times angular frequency is below 2."""
         return 2.0
+
+
+@cache
+def rattle_parts(acting: Acting) -> tuple[Stage, Stage]:
+    """The first half in two, for a solver that finds velocities before anything has moved: kick, and drift."""
+    summed, drags, stiff_springs = acting.summed, acting.drags, acting.stiff_springs
+    bodies, loaded, explosions = acting.bodies, acting.wrenches, acting.explosions
+    accumulate = acting_forces(acting)
+
+    @stage
+    def rattle_kick(tape, s, skip, half):
+        """The contacts of the position stage follow."""
+        if explosions:
+            tell_time(tape, s, splat(0.0))
+        if summed:
+            accumulate(tape, s)
+        damp(tape, s)
+        if drags:
+            flow_drag(tape, s, False)
+        if bodies:
+            damp_bodies(tape, s)
+            kick_bodies(tape, s, splat(0.5) * load(s, tape[H_DT]), loaded)
+        kick(tape, s, splat(0.5) * load(s, tape[H_DT]))
+
+    @stage
+    def rattle_drift(tape, s, skip, half):
+        """The second half follows."""
+        if bodies:
+            drift_bodies(tape, s, load(s, tape[H_DT]))
+        drift(tape, s, load(s, tape[H_DT]))
+        if stiff_springs:
+            flow_stiff_springs(tape, s)
+
+    return rattle_kick, rattle_drift
 
 
 @cache

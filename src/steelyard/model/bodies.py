@@ -45,6 +45,8 @@ class Bodies:
         self._points: dict[tuple[int, tuple[float, ...]], dict[str, int]] = {}
         self._records: list[int] = []
         self._inverses: dict[int, int] = {}
+        self._inertias: dict[int, int] = {}
+        self._masses: dict[int, int] = {}
 
     def state(self) -> None:
         """Rows of the state."""
@@ -96,6 +98,30 @@ class Bodies:
                 else self._c.constant(0.0, 6)
             )
         return self._inverses[id(body)]
+
+    def _inertia(self, body: Body) -> int:
+        """Rows of the inertia."""
+        if id(body) not in self._inertias:
+            k = self.index[id(body)]
+            six = slice(6 * k, 6 * k + 6)
+            self._inertias[id(body)] = self._c.slot(
+                6, ((BODIES, "inertia"),), lambda value: value[six]
+            )
+        return self._inertias[id(body)]
+
+    def _inverse_mass(self, body: Body) -> int:
+        """Row of the inverse mass."""
+        if id(body) not in self._masses:
+            k = self.index[id(body)]
+            self._masses[id(body)] = self._c.slot(
+                1, ((BODIES, "inverse_mass"),), lambda value: value[k : k + 1]
+            )
+        return self._masses[id(body)]
+
+    def rows(self, body: Body) -> list[int]:
+        """Rows of a body's state, inverse mass, inertia and inverse of that."""
+        state = [self.at(name, body) for name in _STATE]
+        return [*state, self._inverse_mass(body), self._inertia(body), self._inverse(body)]
 
     def point(self, name: str, point: BodyPoint) -> int:
         """First row of position, velocity or force of a point; those at one place are one."""
@@ -199,14 +225,9 @@ class Bodies:
             damping = self.powers(integrator.damping_share * c.method.substep)
         for place, body in enumerate(moving):
             k = self.index[id(body)]
-            six = slice(6 * k, 6 * k + 6)
-            inertia = ((BODIES, "inertia"),)
+            *state, mass, inertia, inverse = self.rows(body)
             c.sections["bodies"] += [
-                *(self.at(name, body) for name in _STATE),
-                self._wrenches.get(id(body), nothing),
-                c.slot(1, ((BODIES, "inverse_mass"),), lambda value, k=k: value[k : k + 1]),
-                c.slot(6, inertia, lambda value, six=six: value[six]),
-                self._inverse(body),
+                *state, self._wrenches.get(id(body), nothing), mass, inertia, inverse,
                 c.slot(
                     3, ((BODIES, "acceleration"),), lambda value, k=k: value[3 * k : 3 * k + 3]
                 ),

@@ -26,6 +26,8 @@ from .forces import add_forces
 from .network import Network
 from .parameters import PARTICLES, Key, Parameters, Slot
 from .propagators import add_propagators
+from .rigid import Rigid
+from .rigid_layout import COLLIDER, PAIR, SOLID
 from .saddle import Saddle
 from .stiffness import Stiffness
 from .tape import (
@@ -42,7 +44,7 @@ from .tape import (
 )
 
 #: Header fields that are -1, not an empty section, where a scene has no such rows.
-_ABSENT = ("user_forces", "force", "start", "free", "impulse", "dense", "now")
+_ABSENT = ("user_forces", "force", "start", "free", "impulse", "dense", "now", "rigid")
 
 
 @dataclass
@@ -59,6 +61,8 @@ class Model:
         parameters: assignable values and the rows that follow from them.
         places: first state row and size of what varies, by (thing, name).
         recipe: stages of a step in order, each with its part.
+        met: things of every pair of colliders that can meet.
+        numbers: settings and local geometry of rigid contacts.
         blocks: number of matrix blocks.
         skip: entries of the flags of blocks and what stands behind them.
     """
@@ -72,6 +76,8 @@ class Model:
     parameters: Parameters = field(default_factory=Parameters)
     places: dict[Key, tuple[int, int]] = field(default_factory=dict)
     recipe: Recipe = ()
+    met: tuple[tuple[Any, Any], ...] = ()
+    numbers: np.ndarray = field(default_factory=lambda: np.zeros(0))
     skip: int = 0
     blocks: int = 0
     dropped: list[Any] = field(default_factory=list)
@@ -96,6 +102,7 @@ class Compiler:
         self.links = scene.of(*LINKS)
         self.riders = scene.of(Rider)
         self.contacts = self._contact_pairs()
+        self.rigid = Rigid(self) if method.solver is not None and method.solver.rigid else None
         self.header: dict[str, int] = {}
         self.sections: dict[str, list[int]] = {}
         self.counts: dict[str, int] = {}
@@ -108,7 +115,7 @@ class Compiler:
             "winches": 3, "movers": 5, "links": LINK, "contacts": CONTACT, "generators": 2,
             "recipe": 2, "unknowns": 4, "spring_blocks": 4, "drag_blocks": 1, "float_blocks": 1,
             "bodies": BODY, "points": BODY_POINT, "wrenched": WRENCHED, "applied": 3, "thrusts": 5, "surfaces": 8,
-            "explosions": 4,
+            "explosions": 4, "solids": SOLID, "colliders": COLLIDER, "pairs": PAIR,
             "propagators": 2, "parts": 2, "compliances": COMPLIANCE, "kinks": KINK,
         }  # fmt: skip
         self.next_row = 0
@@ -182,6 +189,8 @@ class Compiler:
     def _contact_pairs(self) -> list[tuple[Any, Particle, Particle | None, int]]:
         """(generator, a, b or None, index of the pair within its generator) in order."""
         pairs: list[tuple[Any, Particle, Particle | None, int]] = []
+        if self.method.solver is not None and self.method.solver.rigid:
+            return pairs
         for generator in self.scene.of(*CONTACTS):
             if isinstance(generator, ContactGenerator):
                 pairs.extend((generator, a, b, k) for k, (a, b) in enumerate(generator.pairs))
@@ -208,6 +217,8 @@ class Compiler:
         user = self.scene.of(UserForce)
         header["user_forces"] = self.state((PARTICLES, "user"), [0.0] * 3 * count) if user else -1
         self._user_contacts()
+        if self.rigid is not None:
+            self.rigid.state()
         if self.method.solver is not None and not self.method.solver.staged:
             most = len(self.links) + len(self.contacts)
             header["moves"] = self.state((PARTICLES, "moves"), np.zeros(6 * most))
@@ -229,6 +240,8 @@ class Compiler:
         add_compliances(self)
         add_riders(self)
         add_contacts(self)
+        if self.rigid is not None:
+            self.rigid.build()
         self.bodies.finish()
         self._method()
         self._network()
@@ -421,7 +434,7 @@ class Compiler:
     def _method(self) -> None:
         """Codes and settings of the method, and the generators in the order they were added."""
         solver = self.method.solver
-        held = solver if self.header["constrained"] else None
+        held = solver if self.header["constrained"] or (self.rigid and self.rigid.pairs) else None
         recipe = self.method.integrator.recipe(held, self._acting())
         self.sections["recipe"] = self._words(recipe)
         self.model.recipe = recipe
@@ -474,6 +487,9 @@ class Compiler:
         self.header["blocks"] = self.model.blocks
         self.header["ends"] = self.model.blocks + tape.WORDS
         self.model.skip = self.header["ends"] + self.header["contacts_most"]
+        if self.rigid is not None and self.rigid.pairs:
+            self._integers = self.model.skip
+            self.model.skip += self.rigid.integers
 
     def _write(self) -> None:
         """The tape: header, then every section with its count in front."""
@@ -482,7 +498,11 @@ class Compiler:
         }
         body: list[int] = []
         for name in names:
-            if name in self.sections:
+            if name == "rigid" and self.rigid is not None and self.rigid.pairs:
+                # Last of all: it knows where the others stand.
+                self.header[name] = HEADER + len(body)
+                body += self.rigid.place(self._integers, self.header)
+            elif name in self.sections:
                 self.header[name] = HEADER + len(body)
                 records = self.sections[name]
                 count = self.counts.get(name, len(records) // self.widths.get(name, 1))

@@ -18,6 +18,8 @@ import numpy as np
 PARTICLES = "particles"
 #: And all bodies'.
 BODIES = "bodies"
+#: Owner of what the contacts of bodies keep.
+RIGID = "rigid"
 
 Key = tuple[Any, str]
 

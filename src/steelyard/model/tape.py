@@ -116,8 +116,12 @@ from __future__ import annotations
     H_SURFACES,
     H_EXPLOSIONS,
     H_NOW,
-) = range(107)
-HEADER = 107
+    H_SOLIDS,
+    H_COLLIDERS,
+    H_PAIRS,
+    H_RIGID,
+) = range(111)
+HEADER = 111
 
 # Width of the records of links, contacts and springs that a solver holds; written field by field.
 LINK = 17
@@ -147,9 +151,9 @@ INERTIA, INVERSE, TURN, SHIFT, CENTRE, DELTA, BASE, MEAN, ARMS = 0, 6, 12, 15, 1
 ARM, BEFORE, AFTER, MOTION, LOAD_ROWS = 0, 3, 6, 9, 12
 
 # Words behind the flags of blocks in ``skip``, from H_BLOCKS on: whether the factor and the forces at hand are not of
-# the step's start, whether worlds in which a contact slips or opens are to be given up, and whether events divided the
-# last step.
-FRESH, HASTY, DIVIDED, WORDS = range(4)
+# the step's start, whether worlds in which a contact slips or opens are to be given up, whether events divided the last
+# step, and how many lanes hold a world.
+FRESH, HASTY, DIVIDED, COUNT, WORDS = range(5)
 
 # Codes of contact geometries.
 GROUND, LINE, USER, BALLS = range(4)

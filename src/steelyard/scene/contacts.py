@@ -1,4 +1,4 @@
-"""Contact generators: what particles can touch."""
+"""Contact generators: what particles and bodies can touch."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from . import checks
+from .body import Body
 from .particle import Particle, check_particles
 
 _SURFACE: dict[str, checks.Rule] = {
@@ -20,14 +21,14 @@ _SURFACE: dict[str, checks.Rule] = {
 
 @dataclass(eq=False, kw_only=True)
 class Ground:
-    """Half-space that particles cannot enter.
+    """Half-space that particles and bodies cannot enter.
 
     Args:
         height: distance [m] of the plane from the origin along its normal.
         normal: direction out of the ground; made a unit vector.
         restitution: rebound speed over impact speed, in [0, 1].
         friction: Coulomb coefficient, at least 0.
-        particles: those that can touch it; all movable ones of the scene by default. Each costs
+        particles: particles and bodies that can touch it; all movable ones of the scene by default. Each costs
             three rows in a solver: name only those that can get there.
     """
 
@@ -35,7 +36,7 @@ class Ground:
     normal: checks.Vector = (0.0, 1.0, 0.0)
     restitution: float = 0.0
     friction: float = 0.0
-    particles: Sequence[Particle] | None = None
+    particles: Sequence[Particle | Body] | None = None
 
     LIMITS: ClassVar[dict[str, checks.Rule]] = _SURFACE | {
         "height": checks.Limit(remedy="Give the plane's distance from the origin."),
@@ -47,7 +48,7 @@ class Ground:
         checks.vectors(self, "normal")
         normal = self.LIMITS["normal"].check("Ground", "normal", np.asarray(self.normal))
         self.normal = tuple(normal.tolist())
-        check_particles(self, "particles")
+        check_particles(self, "particles", others=(Body,))
 
 
 @dataclass(eq=False, kw_only=True)
@@ -118,7 +119,7 @@ def check_thickness(radius: float, particles: Iterable[Particle]) -> None:
 
 @dataclass(eq=False, kw_only=True)
 class Collisions:
-    """Particles as balls of their radius, none of which can enter another.
+    """Particles, as balls of their radius, and bodies, none of which can enter another.
 
     Every pair costs three rows in a solver: name only those that can meet. Two balls whose centres coincide push each
     other up and down.
@@ -126,21 +127,21 @@ class Collisions:
     Args:
         restitution: rebound speed over approach speed, in [0, 1].
         friction: Coulomb coefficient, at least 0. A particle does not turn: friction acts at its centre.
-        particles: those that can meet; all of the scene by default.
+        particles: particles and bodies that can meet; all of the scene by default.
     """
 
     restitution: float = 0.0
     friction: float = 0.0
-    particles: Sequence[Particle] | None = None
+    particles: Sequence[Particle | Body] | None = None
 
     LIMITS: ClassVar[dict[str, checks.Rule]] = _SURFACE
 
     def __post_init__(self) -> None:
         checks.numbers(self, "restitution", "friction")
-        check_particles(self, "particles")
+        check_particles(self, "particles", others=(Body,))
 
-    def pairs_of(self, everything: Sequence[Particle]) -> list[tuple[Particle, Particle]]:
-        """Pairs that can meet, given all particles of the scene; the first of each is movable."""
+    def pairs_of(self, everything: Sequence[Any]) -> list[tuple[Any, Any]]:
+        """Pairs that can meet, given all particles and bodies of the scene; the first of each is movable."""
         chosen = everything if self.particles is None else self.particles
         return [
             (a, b) if a.movable else (b, a)
@@ -148,11 +149,11 @@ class Collisions:
             if a.movable or b.movable
         ]
 
-    def check(self, everything: Sequence[Particle]) -> None:
+    def check(self, everything: Sequence[Any]) -> None:
         """Refuse what can never happen.
 
         Raises:
-            ValueError: no pair, or one of two particles without a radius.
+            ValueError: no pair, two particles without a radius, or a body without a part.
         """
         pairs = self.pairs_of(everything)
         if not pairs:
@@ -162,11 +163,28 @@ class Collisions:
                 "Name two particles."
             )
         for a, b in pairs:
+            for thing in (a, b):
+                check_parts("Collisions", thing)
+            if isinstance(a, Body) or isinstance(b, Body):
+                continue
             if a.radius == 0.0 and b.radius == 0.0:
                 raise ValueError(
                     f"Collisions: radius is 0.0 for the particles at {a.position} and {b.position}; one of "
                     "them must be greater than 0, or they never touch. Give one a radius."
                 )
+
+
+def check_parts(owner: str, thing: Particle | Body) -> None:
+    """Refuse a body that nothing can touch.
+
+    Raises:
+        ValueError: it has no part.
+    """
+    if isinstance(thing, Body) and not thing.parts:
+        raise ValueError(
+            f"{owner}: the body at {thing.position} has 0 parts; it must have at least 1, or nothing touches it. Give "
+            "parts=Sphere(...), or name the other things."
+        )
 
 
 @dataclass(eq=False)

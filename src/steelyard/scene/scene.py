@@ -10,7 +10,14 @@ import numpy as np
 from . import checks
 from .body import Body, BodyPoint
 from .body_forces import BODY_FORCES
-from .contacts import Collisions, ContactGenerator, Ground, LinePlatform, check_thickness
+from .contacts import (
+    Collisions,
+    ContactGenerator,
+    Ground,
+    LinePlatform,
+    check_parts,
+    check_thickness,
+)
 from .forces import (
     AnchoredBungee,
     AnchoredSpring,
@@ -154,12 +161,20 @@ class Scene:
             return [particle for particle in self.particles if particle.movable]
         return [member for member in members(thing) if isinstance(member, Particle)]
 
+    def bodies_at(self, contact: Any) -> list[Body]:
+        """The bodies that a ground or collisions can meet: all movable ones, or those that it names."""
+        if not isinstance(contact, Ground | Collisions):
+            return []
+        chosen = self.bodies if contact.particles is None else contact.particles
+        return [thing for thing in chosen if isinstance(thing, Body) and thing.movable]
+
     def check(self) -> None:
         """Make sure that worlds of this scene mean something.
 
         Raises:
             ValueError: neither particle nor body, a line platform that one of its particles can never touch, collisions
-                of none, drag on a body with a pivot, or contacts of everything in a scene with bodies.
+                of none, drag on a body with a pivot, a line platform for everything in a scene with bodies, or contacts
+                of a body without a part.
         """
         if not self.particles and not self.bodies:
             raise ValueError(
@@ -172,18 +187,21 @@ class Scene:
                     "Scene: a Drag on a body with a pivot, which does not move; it takes none. Name the others "
                     "(Drag(particles=[...])), and give the body angular_damping."
                 )
+        for contact in self.of(Ground):
+            for body in self.bodies_at(contact):
+                check_parts("Ground", body)
         if any(body.movable for body in self.bodies):
-            for contact in self.of(Ground, LinePlatform, Collisions):
-                if contact.particles is None:
-                    name = type(contact).__name__
+            for line in self.of(LinePlatform):
+                if line.particles is None:
                     raise ValueError(
-                        f"Scene: a {name} for all of a scene with bodies; it meets particles alone so far, and bodies "
-                        f"would pass through it unseen. Name the particles: {name}(particles=[...])."
+                        "Scene: a LinePlatform for all of a scene with bodies; it meets particles alone, and bodies "
+                        "would pass through it unseen. Name the particles (LinePlatform(particles=[...])), and give "
+                        "bodies an immovable Body with a Capsule."
                     )
         for line in self.of(LinePlatform):
             check_thickness(line.radius, self.touched(line))
         for collisions in self.of(Collisions):
-            collisions.check(self.particles)
+            collisions.check([*self.particles, *self.bodies])
 
     def of(self, *kinds: type) -> list[Any]:
         """The things of exactly these kinds, in the order they were added."""

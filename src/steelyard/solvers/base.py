@@ -19,6 +19,14 @@ class Solver:
     #: Whether it holds springs and bungees as constraints that give way; else they are forces.
     compliant: ClassVar[bool] = False
 
+    #: Whether it holds contacts of bodies and particles as solids, by velocities before the drift.
+    rigid: ClassVar[bool] = False
+
+    @property
+    def start(self) -> Stage:
+        """Of a rigid solver: what it notes before the first kick."""
+        raise NotImplementedError
+
     @property
     def stage(self) -> Stage:
         """What puts positions (half 0) or velocities (half 1) on the constraints."""

@@ -1,0 +1,298 @@
+"""The contacts of one world: pairs that are near, the points of each, and what the last step knew of them.
+
+Pairs are tried by balls about their colliders, then by the narrow phase. A point is kept where the gap may close within
+the step, so that fast bodies meet the surface and not what lies behind it. A full buffer keeps the deepest points.
+Points take their impulse from the stored ones: by id, then, within their pair, from the nearest that is left; one to
+one, since a point that serves two lets stacks fall.
+"""
+
+from __future__ import annotations
+
+from ..constraints.contact_rows import contact_vector, length, prepare_rows
+from ..constraints.solids import solid_at
+from ..kernel import inner
+from ..math.pointers import LANES, doubles_at
+from ..model.colliders import HALF_SPACE, PLACED, SPHERE
+from ..model.rigid_layout import (
+    C_BEFORE,
+    C_EARLIER,
+    C_FRICTION,
+    C_GAP,
+    C_ID,
+    C_PLACE,
+    C_REBOUND,
+    C_RESTITUTION,
+    CAPACITY,
+    COLLIDER,
+    COLLIDER_RECORDS,
+    COLLIDERS,
+    CONTACT_ENTRIES,
+    CONTACT_WORK,
+    END_A,
+    END_B,
+    G_PLACE,
+    G_REACH,
+    G_SIZE,
+    G_TURN,
+    GEOMETRY,
+    MATCHED,
+    NARROW_WORK,
+    NUMBERS,
+    OVERFLOW_ROW,
+    PAIR,
+    PAIR_RECORDS,
+    PAIRS,
+    PLACED_WORK,
+    POINTS_WORK,
+    S_FREE,
+    S_MOVES,
+    S_PLACE,
+    S_ROTATION,
+    S_TURNS,
+    SETTINGS,
+    STORED,
+    STORED_ROW,
+    T_ID,
+    T_IMPULSE,
+    T_PLACE,
+    T_REBOUND,
+)
+from .narrow_phase import IDS, POINT, collide
+
+# How far a point may be from a stored one of its pair to take its impulse, over the reach of its colliders.
+_NEAR = 0.25
+
+# Behind what the narrow phase reads of a placed collider: its reach and how far it may move within the step.
+_REACH, _MOVE, PLACED_ENTRIES = PLACED, PLACED + 1, PLACED + 2
+
+
+@inner
+def place_colliders(tape, s, rigid, k, dt):
+    """All colliders of lane k in the world."""
+    numbers = doubles_at(tape[rigid + NUMBERS])
+    record = tape[rigid + COLLIDER_RECORDS]
+    at = tape[rigid + PLACED_WORK]
+    for _ in range(tape[rigid + COLLIDERS]):
+        kind = tape[record]
+        row = tape[record + 3]
+        if kind == HALF_SPACE:
+            _place_plane(s, row, k, at)
+            s[at + _REACH] = 0.0
+            s[at + _MOVE] = 0.0
+        else:
+            g = SETTINGS + GEOMETRY * tape[record + 2]
+            solid = solid_at(tape, rigid, tape[record + 1])
+            turn = solid + S_ROTATION
+            for i in range(3):
+                r0 = s[turn + 3 * i]
+                r1 = s[turn + 3 * i + 1]
+                r2 = s[turn + 3 * i + 2]
+                p = g + G_PLACE
+                s[at + i] = s[solid + S_PLACE + i] + (
+                    r0 * numbers[p] + r1 * numbers[p + 1] + r2 * numbers[p + 2]
+                )
+                for j in range(3):
+                    t = g + G_TURN + j
+                    s[at + 3 + 3 * i + j] = (
+                        r0 * numbers[t] + r1 * numbers[t + 3] + r2 * numbers[t + 6]
+                    )
+                s[at + 12 + i] = numbers[g + G_SIZE + i]
+            reach = numbers[g + G_REACH]
+            if kind == SPHERE and row >= 0:
+                reach = s[LANES * row + k]
+                s[at + 12] = reach
+            s[at + _REACH] = reach
+            v = solid + S_FREE
+            speed = s[solid + S_MOVES] * length(s[v], s[v + 1], s[v + 2])
+            if s[solid + S_TURNS] != 0.0:
+                arm = reach + length(
+                    s[at] - s[solid], s[at + 1] - s[solid + 1], s[at + 2] - s[solid + 2]
+                )
+                speed += arm * length(s[v + 3], s[v + 4], s[v + 5])
+            s[at + _MOVE] = speed * dt
+        record += COLLIDER
+        at += PLACED_ENTRIES
+
+
+@inner
+def _place_plane(s, row, k, at):
+    """A half-space from the rows of its unit normal and its height."""
+    x = s[LANES * row + k]
+    y = s[LANES * (row + 1) + k]
+    z = s[LANES * (row + 2) + k]
+    height = s[LANES * (row + 3) + k]
+    s[at] = height * x
+    s[at + 1] = height * y
+    s[at + 2] = height * z
+    for i in range(12):
+        s[at + 3 + i] = 0.0
+    s[at + 4] = x
+    s[at + 7] = y
+    s[at + 10] = z
+
+
+@inner
+def _apart(s, kind, a, b, margin):
+    """Whether the balls about two colliders, or that about a and a half-space b, are further apart than the margin."""
+    dx = s[a] - s[b]
+    dy = s[a + 1] - s[b + 1]
+    dz = s[a + 2] - s[b + 2]
+    reach = s[a + _REACH] + s[b + _REACH] + margin
+    if kind == HALF_SPACE:
+        return dx * s[b + 4] + dy * s[b + 7] + dz * s[b + 10] > reach
+    return dx * dx + dy * dy + dz * dz > reach * reach
+
+
+@inner
+def find_contacts(tape, s, n, rigid, k, slack):
+    """Write the contacts of lane k to the work area; how many.
+
+    Args:
+        slack: gap [m] up to which points are kept, beside what both may move within the step.
+    """
+    capacity = tape[rigid + CAPACITY]
+    points = tape[rigid + POINTS_WORK]
+    work = tape[rigid + NARROW_WORK]
+    placed = tape[rigid + PLACED_WORK]
+    colliders = tape[rigid + COLLIDER_RECORDS]
+    count = 0
+    lost = False
+    record = tape[rigid + PAIR_RECORDS]
+    for pair in range(tape[rigid + PAIRS]):
+        first = tape[record]
+        second = tape[record + 1]
+        a = placed + PLACED_ENTRIES * first
+        b = placed + PLACED_ENTRIES * second
+        kind_a = tape[colliders + COLLIDER * first]
+        kind_b = tape[colliders + COLLIDER * second]
+        margin = slack + s[a + _MOVE] + s[b + _MOVE]
+        if not _apart(s, kind_b, a, b, margin):
+            found = collide(s, kind_a, a, kind_b, b, points, work, margin)
+            for point in range(found):
+                source = points + POINT * point
+                place = count
+                if count == capacity:
+                    lost = True
+                    place = _shallowest(tape, s, rigid, count, s[source + C_GAP])
+                if place >= 0:
+                    c = tape[rigid + CONTACT_WORK] + CONTACT_ENTRIES * place
+                    for i in range(C_ID):
+                        s[c + i] = s[source + i]
+                    s[c + C_ID] = IDS * pair + s[source + C_ID]
+                    s[c + C_RESTITUTION] = s[LANES * tape[record + 2] + k]
+                    s[c + C_FRICTION] = s[LANES * tape[record + 3] + k]
+                    one = tape[colliders + COLLIDER * first + 1]
+                    other = tape[colliders + COLLIDER * second + 1]
+                    n[tape[rigid + END_A] + place] = one
+                    n[tape[rigid + END_B] + place] = _movable(tape, s, rigid, other)
+                    if count < capacity:
+                        count += 1
+        record += PAIR
+    if lost:
+        s[LANES * tape[rigid + OVERFLOW_ROW] + k] = 1.0
+    return count
+
+
+@inner
+def _movable(tape, s, rigid, i):
+    """A solid's index, or -1 where nothing moves it."""
+    if i >= 0:
+        solid = solid_at(tape, rigid, i)
+        if s[solid + S_MOVES] == 0.0 and s[solid + S_TURNS] == 0.0:
+            return -1
+    return i
+
+
+@inner
+def _shallowest(tape, s, rigid, count, gap):
+    """The contact with the largest gap, or -1 if that is no larger than ``gap``."""
+    found = -1
+    for i in range(count):
+        own = s[tape[rigid + CONTACT_WORK] + CONTACT_ENTRIES * i + C_GAP]
+        if own > gap:
+            gap = own
+            found = i
+    return found
+
+
+@inner
+def prepare_contacts(tape, s, n, rigid, count):
+    """Frames and arms of all contacts."""
+    for i in range(count):
+        c = tape[rigid + CONTACT_WORK] + CONTACT_ENTRIES * i
+        a = solid_at(tape, rigid, n[tape[rigid + END_A] + i])
+        b = n[tape[rigid + END_B] + i]
+        prepare_rows(s, c, a, solid_at(tape, rigid, b) if b >= 0 else -1)
+
+
+@inner
+def _stored(tape, rigid, j, field, k):
+    """Entry of a stored contact's field in lane k."""
+    return LANES * (tape[rigid + STORED_ROW] + STORED * j + field) + k
+
+
+@inner
+def _take(tape, s, n, rigid, k, c, j):
+    """Give a contact what is stored in place j."""
+    at = _stored(tape, rigid, j, T_IMPULSE, k)
+    t0, t1, t2 = contact_vector(s, c, s[at], s[at + LANES], s[at + 2 * LANES])
+    s[c + C_BEFORE] = t0 if t0 > 0.0 else 0.0
+    s[c + C_BEFORE + 1] = t1
+    s[c + C_BEFORE + 2] = t2
+    s[c + C_REBOUND] = s[_stored(tape, rigid, j, T_REBOUND, k)]
+    s[c + C_EARLIER] = 1.0
+    n[tape[rigid + MATCHED] + j] = 1
+
+
+@inner
+def match_contacts(tape, s, n, rigid, k, count):
+    """Impulses and rebounds of the stored contacts to those at hand."""
+    old = 0
+    capacity = tape[rigid + CAPACITY]
+    while old < capacity and s[_stored(tape, rigid, old, T_ID, k)] > 0.0:
+        n[tape[rigid + MATCHED] + old] = 0
+        old += 1
+    hint = 0
+    for i in range(count):
+        c = tape[rigid + CONTACT_WORK] + CONTACT_ENTRIES * i
+        s[c + C_BEFORE] = 0.0
+        s[c + C_BEFORE + 1] = 0.0
+        s[c + C_BEFORE + 2] = 0.0
+        s[c + C_REBOUND] = 0.0
+        s[c + C_EARLIER] = 0.0
+        wanted = s[c + C_ID] + 1.0
+        for step in range(old):
+            j = hint + step
+            if j >= old:
+                j -= old
+            if s[_stored(tape, rigid, j, T_ID, k)] == wanted:
+                _take(tape, s, n, rigid, k, c, j)
+                hint = j + 1
+                break
+    for i in range(count):
+        c = tape[rigid + CONTACT_WORK] + CONTACT_ENTRIES * i
+        if s[c + C_EARLIER] == 0.0:
+            _match_nearest(tape, s, n, rigid, k, c, old)
+
+
+@inner
+def _match_nearest(tape, s, n, rigid, k, c, old):
+    """Take from the nearest contact of the pair that serves no other."""
+    pair = s[c + C_ID] // IDS
+    a = tape[rigid + PAIR_RECORDS] + PAIR * int(pair)
+    reach = s[tape[rigid + PLACED_WORK] + PLACED_ENTRIES * tape[a] + _REACH]
+    least = (_NEAR * reach) ** 2
+    nearest = -1
+    for j in range(old):
+        stored = s[_stored(tape, rigid, j, T_ID, k)] - 1.0
+        if n[tape[rigid + MATCHED] + j] == 0 and stored // IDS == pair:
+            at = _stored(tape, rigid, j, T_PLACE, k)
+            dx = s[at] - s[c + C_PLACE]
+            dy = s[at + LANES] - s[c + C_PLACE + 1]
+            dz = s[at + 2 * LANES] - s[c + C_PLACE + 2]
+            square = dx * dx + dy * dy + dz * dz
+            if square < least:
+                least = square
+                nearest = j
+    if nearest >= 0:
+        _take(tape, s, n, rigid, k, c, nearest)

@@ -1,0 +1,137 @@
+"""Manifolds: the points at which two placed colliders touch, ``POINT`` numbers each.
+
+Of a point: unit normal from b to a, gap along it (below 0: penetration), place midway between both surfaces, and an id
+that stays while the same features touch. All sizes in metres, in the world's axes.
+"""
+
+from __future__ import annotations
+
+from ..kernel import inner
+from ..model.colliders import TURN
+
+POINT = 8
+#: Points that a pair keeps, and those that it may have before they are reduced.
+MOST_POINTS, ALL_POINTS = 4, 8
+#: Ids of a pair are below this.
+IDS = 128
+_GAP, _PLACE, _ID = 3, 4, 7
+# Rounding decides nothing: of equal points the first is kept.
+_TIE = 1e-9
+
+
+@inner
+def put_point(m, out, index, nx, ny, nz, gap, x, y, z, name):
+    """Write a point whose place is given on the surface of a, midway being half the gap against the normal."""
+    at = out + POINT * index
+    m[at] = nx
+    m[at + 1] = ny
+    m[at + 2] = nz
+    m[at + _GAP] = gap
+    m[at + _PLACE] = x - 0.5 * gap * nx
+    m[at + _PLACE + 1] = y - 0.5 * gap * ny
+    m[at + _PLACE + 2] = z - 0.5 * gap * nz
+    m[at + _ID] = name
+
+
+@inner
+def axis(m, placed, k):
+    """Axis k of a placed collider in the world."""
+    return m[placed + TURN + k], m[placed + TURN + 3 + k], m[placed + TURN + 6 + k]
+
+
+@inner
+def local(m, placed, x, y, z):
+    """A vector of the world in the axes of a placed collider."""
+    t = placed + TURN
+    return (
+        m[t] * x + m[t + 3] * y + m[t + 6] * z,
+        m[t + 1] * x + m[t + 4] * y + m[t + 7] * z,
+        m[t + 2] * x + m[t + 5] * y + m[t + 8] * z,
+    )
+
+
+@inner
+def outward(m, placed, x, y, z):
+    """A vector in the axes of a placed collider in those of the world."""
+    t = placed + TURN
+    return (
+        m[t] * x + m[t + 1] * y + m[t + 2] * z,
+        m[t + 3] * x + m[t + 4] * y + m[t + 5] * z,
+        m[t + 6] * x + m[t + 7] * y + m[t + 8] * z,
+    )
+
+
+@inner
+def flip(m, out, count):
+    """Normals from a to b instead."""
+    for index in range(count):
+        for k in range(3):
+            m[out + POINT * index + k] *= -1.0
+
+
+@inner
+def _swap(m, out, i, j):
+    for k in range(POINT):
+        value = m[out + POINT * i + k]
+        m[out + POINT * i + k] = m[out + POINT * j + k]
+        m[out + POINT * j + k] = value
+
+
+@inner
+def _signed_area(m, out, i, j, k):
+    """Twice the area of three points seen along the normal."""
+    a = out + POINT * i + _PLACE
+    b = out + POINT * j + _PLACE
+    c = out + POINT * k + _PLACE
+    ux, uy, uz = m[b] - m[a], m[b + 1] - m[a + 1], m[b + 2] - m[a + 2]
+    vx, vy, vz = m[c] - m[a], m[c + 1] - m[a + 1], m[c + 2] - m[a + 2]
+    return (
+        m[out] * (uy * vz - uz * vy)
+        + m[out + 1] * (uz * vx - ux * vz)
+        + m[out + 2] * (ux * vy - uy * vx)
+    )
+
+
+@inner
+def reduce_points(m, out, count):
+    """Keep the deepest point and three that span the largest area with it; how many are left."""
+    if count <= MOST_POINTS:
+        return count
+    best = 0
+    for i in range(1, count):
+        if m[out + POINT * i + _GAP] < m[out + POINT * best + _GAP] - _TIE:
+            best = i
+    _swap(m, out, 0, best)
+    best = 1
+    most = -1.0
+    for i in range(1, count):
+        square = 0.0
+        for k in range(3):
+            d = m[out + POINT * i + _PLACE + k] - m[out + _PLACE + k]
+            square += d * d
+        if square > most * (1.0 + _TIE):
+            most = square
+            best = i
+    _swap(m, out, 1, best)
+    best = 2
+    most = -1.0
+    for i in range(2, count):
+        area = abs(_signed_area(m, out, 0, 1, i))
+        if area > most * (1.0 + _TIE):
+            most = area
+            best = i
+    _swap(m, out, 2, best)
+    # The last one lies furthest outside the triangle of the others, whichever side that is of.
+    side = 1.0 if _signed_area(m, out, 0, 1, 2) > 0.0 else -1.0
+    best = 3
+    most = -1e300
+    for i in range(3, count):
+        beyond = max(
+            -side * _signed_area(m, out, 0, 1, i),
+            max(-side * _signed_area(m, out, 1, 2, i), -side * _signed_area(m, out, 2, 0, i)),
+        )
+        if beyond > most + _TIE * abs(most):
+            most = beyond
+            best = i
+    _swap(m, out, 3, best)
+    return MOST_POINTS

@@ -1,0 +1,191 @@
+"""Contacts of bodies and particles as solids compiled to records: what ``solvers.proximal_newton`` works on."""
+
+from __future__ import annotations
+
+from itertools import combinations
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..collision.contact_list import PLACED_ENTRIES
+from ..collision.narrow_phase import ALL_POINTS, MOST_POINTS, POINT, WORK
+from ..math.pointers import LANES
+from ..scene.body import Body
+from ..scene.contacts import Collisions, Ground
+from ..scene.particle import Particle
+from ..solvers.block_cholesky import SIX
+from . import rigid_layout as at
+from .colliders import BOX, CAPSULE, HALF_SPACE, SPHERE, Colliders, colliders_of
+from .parameters import PARTICLES, RIGID
+
+if TYPE_CHECKING:
+    from .compile import Compiler
+
+#: Most points of a pair by both kinds; of those not named, MOST_POINTS.
+_POINTS = {SPHERE: 1, CAPSULE: 2}
+#: Most contacts of a solid that a buffer is made for, where nothing else is said.
+_USUAL = 16
+
+
+class Rigid:
+    """Colliders, pairs and rows of a scene whose solver holds contacts of bodies."""
+
+    def __init__(self, c: Compiler) -> None:
+        self._c = c
+        self.colliders: Colliders = colliders_of(c.scene, points=True)
+        self.pairs = self._pairs()
+        self.capacity = self._capacity()
+
+    @property
+    def _things(self) -> list[Body | Particle]:
+        """What solids are of, in order."""
+        return [*self._c.scene.bodies, *self._c.particles]
+
+    def _pairs(self) -> list[tuple[int, int, Any]]:
+        """(collider that can move, other collider, generator) in order."""
+        scene, colliders = self._c.scene, self.colliders
+        everything = self._things
+        pairs: list[tuple[int, int, Any]] = []
+        for generator in scene.of(Ground, Collisions):
+            chosen = everything if generator.particles is None else list(generator.particles)
+            own = colliders.of(*chosen)
+            if isinstance(generator, Ground):
+                (plane,) = colliders.of(generator)
+                pairs += [(k, plane, generator) for k in own if colliders.owner[k].movable]
+                continue
+            for a, b in combinations(own, 2):
+                first, second = colliders.owner[a], colliders.owner[b]
+                if first is not second and (first.movable or second.movable):
+                    pairs.append((a, b, generator) if first.movable else (b, a, generator))
+        return pairs
+
+    def _capacity(self) -> int:
+        """Contacts that the buffer of a world holds."""
+        given: int | None = getattr(self._c.method.solver, "contacts", None)
+        if given is not None:
+            return given
+        kind = self.colliders.kind
+        each = (
+            min(_POINTS.get(kind[a], MOST_POINTS), _POINTS.get(kind[b], MOST_POINTS))
+            for a, b, _ in self.pairs
+        )
+        movable = sum(thing.movable for thing in self._things)
+        return min(sum(each), _USUAL * movable)
+
+    def state(self) -> None:
+        """Stored contacts, and whether some did not fit."""
+        if self.pairs:
+            self._c.state((RIGID, "contacts"), np.zeros(at.STORED * self.capacity))
+            self._c.state((RIGID, "overflow"), [0.0])
+
+    def build(self) -> None:
+        """Records, numbers and work rows."""
+        c = self._c
+        c.header["rigid"] = -1
+        if not self.pairs:
+            return
+        owner = self.colliders.owner
+        c.model.met = tuple((owner[a], owner[b]) for a, b, _ in self.pairs)
+        things = self._things
+        index = {id(thing): i for i, thing in enumerate(things)}
+        solids = [word for thing in things for word in self._solid(thing)]
+        colliders = [word for k in range(len(self.colliders)) for word in self._collider(k, index)]
+        surfaces: dict[int, tuple[int, int]] = {}
+        pairs: list[int] = []
+        for a, b, generator in self.pairs:
+            if id(generator) not in surfaces:
+                surfaces[id(generator)] = (
+                    c.parameter(generator, "restitution", generator.restitution),
+                    c.parameter(generator, "friction", generator.friction),
+                )
+            pairs += [a, b, *surfaces[id(generator)]]
+        for name, records in (("solids", solids), ("colliders", colliders), ("pairs", pairs)):
+            c.sections[name] = records
+        self._numbers()
+        self._record(len(things))
+
+    def _solid(self, thing: Body | Particle) -> list[int]:
+        """Record of what contacts push."""
+        c = self._c
+        flags = int(thing.movable)
+        if isinstance(thing, Particle):
+            mass = c.header["inverse_mass"] + c.of(thing)
+            return [c.at("position", thing), -1, c.at("velocity", thing), -1, mass, -1, -1, flags]
+        if thing.movable:
+            flags = 3 if thing.pivot is None else 2
+        rows = c.bodies.rows(thing)
+        return [*rows, flags]
+
+    def _collider(self, k: int, index: dict[int, int]) -> list[int]:
+        """Record of a collider."""
+        c = self._c
+        owner, kind = self.colliders.owner[k], int(self.colliders.kind[k])
+        if kind == HALF_SPACE:
+            normal = c.parameter(owner, "normal", owner.normal)
+            height = c.parameter(owner, "height", owner.height)
+            assert height == normal + 3
+            return [kind, -1, k, normal]
+        row = -1
+        if isinstance(owner, Particle):
+            p = c.of(owner)
+            row = c.slot(1, ((PARTICLES, "radius"),), lambda value: value[p : p + 1])
+        return [kind, index[id(owner)], k, row]
+
+    def _numbers(self) -> None:
+        """Settings and local geometry."""
+        colliders = self.colliders
+        geometry = np.zeros((len(colliders), at.GEOMETRY))
+        geometry[:, at.G_PLACE : at.G_PLACE + 3] = colliders.place
+        geometry[:, at.G_TURN : at.G_TURN + 9] = colliders.turn.reshape(-1, 9)
+        geometry[:, at.G_SIZE : at.G_SIZE + 3] = colliders.size
+        reach = colliders.size.sum(axis=1)
+        boxes = colliders.kind == BOX
+        reach[boxes] = np.linalg.norm(colliders.size[boxes], axis=1)
+        geometry[:, at.G_REACH] = reach
+        settings = np.array(self._c.method.solver.settings)  # type: ignore[union-attr]
+        self._c.model.numbers = np.concatenate([settings, geometry.ravel()])
+
+    def _record(self, solids: int) -> None:
+        """The record that holds it all together."""
+        c = self._c
+        capacity = self.capacity
+
+        def entries(size: int) -> int:
+            return LANES * c.take(-(-size // LANES))
+
+        words = dict.fromkeys(range(at.RIGID_WORDS), 0)
+        words[at.SOLIDS] = solids
+        words[at.COLLIDERS] = len(self.colliders)
+        words[at.PAIRS] = len(self.pairs)
+        words[at.NUMBERS] = c.model.numbers.ctypes.data
+        words[at.STORED_ROW] = c.model.places[RIGID, "contacts"][0]
+        words[at.OVERFLOW_ROW] = c.model.places[RIGID, "overflow"][0]
+        words[at.CAPACITY] = capacity
+        words[at.START_ROW] = c.take(6 * solids)
+        words[at.SOLID_WORK] = entries(at.SOLID_ENTRIES * solids)
+        words[at.PLACED_WORK] = entries(PLACED_ENTRIES * len(self.colliders))
+        words[at.CONTACT_WORK] = entries(at.CONTACT_ENTRIES * capacity)
+        words[at.POINTS_WORK] = entries(POINT * ALL_POINTS)
+        words[at.NARROW_WORK] = entries(WORK)
+        words[at.MATRIX_ROW] = c.take(SIX * (solids * (solids + 1) // 2))
+        words[at.VECTOR_ROW] = c.take(solids + 8)
+        place = 0
+        for word, size in (
+            (at.DEGREES, solids + 1), (at.ADJACENT, 2 * capacity), (at.ORDER, solids), (at.LOCAL, solids),
+            (at.FIRST, solids), (at.STARTS, solids), (at.END_A, capacity), (at.END_B, capacity),
+            (at.LIST, capacity), (at.MATCHED, capacity),
+        ):  # fmt: skip
+            words[word] = place
+            place += size
+        #: Integers of the work area.
+        self.integers = place
+        self.words = words
+
+    def place(self, first: int, sections: dict[str, int]) -> list[int]:
+        """The record's words, given where integers begin and where the sections stand on the tape."""
+        words = dict(self.words)
+        for name in ("solids", "colliders", "pairs"):
+            words[getattr(at, f"{name[:-1].upper()}_RECORDS")] = sections[name] + 1
+        for word in range(at.DEGREES, at.RIGID_WORDS):
+            words[word] += first
+        return [words[k] for k in range(at.RIGID_WORDS)]

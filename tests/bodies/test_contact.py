@@ -1,0 +1,405 @@
+"""Contact of bodies: impacts, friction at its limit, stacks, heaps, and what the buffer and bad input do."""
+
+import math
+
+import numpy as np
+import pytest
+
+import steelyard as sy
+
+CUBE = (0.5, 0.5, 0.5)
+
+
+def box(scene, x, y, z=0.0, *, half=CUBE, density=1000.0, **more):
+    part = sy.Part(shape=sy.Box(half), density=density)
+    return scene.add(sy.Body(position=(x, y, z), parts=part, **more))
+
+
+def on_ground(scene, friction=0.6, restitution=0.0):
+    scene.add(sy.Ground(friction=friction, restitution=restitution))
+    if len(scene.bodies) > 1:
+        scene.add(sy.Collisions(friction=friction, restitution=restitution))
+    return scene
+
+
+def settled(scene, seconds=10.0, dt=1 / 60, **more):
+    """A world after so many seconds, and how far anything moved in the last five sixths of them."""
+    world = sy.World(scene, method=sy.Method(sy.Rattle(), sy.ProximalNewton(**more), dt=dt))
+    steps = round(seconds / dt)
+    world.step(steps // 6)
+    before = world.bodies.position.copy()
+    world.step(steps - steps // 6)
+    assert world.health[0] == 0
+    return world, np.abs(world.bodies.position - before).max()
+
+
+# Impacts
+
+
+@pytest.mark.parametrize("e", [0.0, 0.3, 0.5, 1.0])
+@pytest.mark.parametrize("dt", [1 / 60, 1 / 1000])
+def test_a_ball_leaves_the_ground_at_e_times_the_speed_of_impact(e, dt):
+    scene = sy.Scene()
+    scene.add(sy.Body(position=(0, 1.5, 0), parts=sy.Sphere(0.5)))
+    scene.add(sy.Ground(restitution=e))
+    world = sy.World(scene, method=sy.Method(sy.Rattle(), sy.ProximalNewton(), dt=dt))
+    while world.bodies.velocity[0, 0, 1] <= 0.0 and world.time[0] < 0.6:
+        world.step(1)
+    speed, height = world.bodies.velocity[0, 0, 1], world.bodies.position[0, 0, 1] - 0.5
+    # By energy: the speed at the ground itself.
+    assert speed**2 + 2 * 9.81 * height == pytest.approx(e**2 * 2 * 9.81, abs=1e-10)
+
+
+@pytest.mark.parametrize("e", [0.0, 0.4, 1.0])
+def test_balls_that_meet_head_on_part_as_newton_says(e):
+    scene = sy.Scene(gravity=(0, 0, 0))
+    scene.add(sy.Body(position=(-1, 0, 0), velocity=(3, 0, 0), parts=sy.Sphere(0.5)))
+    scene.add(sy.Body(position=(0.7, 0, 0), velocity=(-1, 0, 0), parts=sy.Sphere(0.4)))
+    scene.add(sy.Collisions(restitution=e, friction=0.5))
+    world = sy.World(scene)
+    momentum = world.momentum.copy()
+    world.step(60)
+    va, vb = world.bodies.velocity[0, :, 0]
+    assert vb - va == pytest.approx(4.0 * e, abs=1e-11)
+    assert world.momentum[0] == pytest.approx(momentum[0], abs=1e-11)
+
+
+def test_momentum_is_kept_in_a_heap_without_gravity():
+    rng = np.random.default_rng(2)
+    scene = sy.Scene(gravity=(0, 0, 0))
+    for place in np.stack(np.meshgrid(*[np.arange(2) * 1.2] * 3), -1).reshape(-1, 3):
+        box(
+            scene, *place, velocity=tuple(-3 * (place - 0.6)), orientation=tuple(rng.normal(size=4))
+        )
+    scene.add(sy.Collisions(friction=0.5, restitution=0.3))
+    # Overlaps are left: pushing them apart moves places, by which linear momentum counts as angular.
+    world = sy.World(scene, method=sy.Method(sy.Rattle(), sy.ProximalNewton(slop=1.0)))
+    linear, angular, energy = world.momentum.copy(), world.angular_momentum.copy(), world.energy[0]
+    world.step(60)
+    assert world.energy[0] < 0.9 * energy
+    size = 1000.0 * 8 * 3
+    np.testing.assert_allclose(world.momentum, linear, atol=1e-11 * size)
+    np.testing.assert_allclose(world.angular_momentum, angular, atol=1e-11 * size)
+
+
+def test_bouncing_keeps_its_energy():
+    """49 balls of the SimBenchmark, e = 1, for 5 s at 1 ms."""
+    scene = sy.Scene()
+    for x in range(7):
+        for z in range(7):
+            scene.add(
+                sy.Body(position=(2.0 * x, 1.0 + 0.1 * (7 * x + z), 2.0 * z), parts=sy.Sphere(0.5))
+            )
+    scene.add(sy.Ground(restitution=1.0))
+    world = sy.World(scene, method=sy.Method(sy.Rattle(), sy.ProximalNewton(), dt=1e-3))
+    before = world.energy[0]
+    errors = []
+    for _ in range(50):
+        world.step(100)
+        errors.append(world.energy[0] / before - 1.0)
+    assert np.sqrt(np.mean(np.square(errors))) < 1e-9
+
+
+# Friction
+
+
+@pytest.mark.parametrize("share", [1.001, 0.999])
+def test_a_block_on_an_incline_at_the_limit_of_friction(share):
+    mu, g = 0.5, 9.81
+    slope = math.atan(mu / share)
+    scene = sy.Scene(gravity=(g * math.sin(slope), -g * math.cos(slope), 0))
+    box(scene, 0, 0.25, half=(0.5, 0.25, 0.4))
+    scene.add(sy.Ground(friction=mu))
+    world = sy.World(scene)
+    world.step(120)
+    if share > 1.0:
+        assert np.abs(world.bodies.velocity).max() < 1e-9
+    else:
+        way = 2.0 * g * (math.sin(slope) - mu * math.cos(slope))
+        assert world.bodies.position[0, 0, 0] == pytest.approx(way, rel=1e-2)
+
+
+def test_a_sliding_ball_comes_to_roll():
+    scene = sy.Scene()
+    scene.add(sy.Body(position=(0, 0.5, 0), velocity=(2, 0, 0), parts=sy.Sphere(0.5)))
+    scene.add(sy.Ground(friction=0.3))
+    world = sy.World(scene)
+    world.step(120)
+    assert world.bodies.velocity[0, 0, 0] == pytest.approx(10 / 7, abs=1e-6)
+    assert world.bodies.angular_velocity[0, 0, 2] == pytest.approx(-20 / 7, abs=2e-6)
+
+
+def test_friction_is_along_the_way_and_no_larger_than_mu_times_the_load():
+    scene = sy.Scene()
+    body = box(scene, 0, 0.5, velocity=(3, 0, 4))
+    ground = scene.add(sy.Ground(friction=0.4))
+    world = sy.World(scene)
+    world.step(10)
+    force = world.contacts.force_on(body)[0]
+    weight = body.mass * 9.81
+    np.testing.assert_allclose(force, weight * np.array([-0.24, 1.0, -0.32]), rtol=1e-6)
+    np.testing.assert_allclose(world.contacts.force_on(ground)[0], -force)
+
+
+# Stacks
+
+
+def test_a_stack_of_twenty_stands():
+    scene = sy.Scene()
+    for i in range(20):
+        box(scene, 0, 0.5 + i)
+    world, moved = settled(on_ground(scene))
+    assert moved < 1e-8
+    assert np.abs(world.bodies.velocity).max() < 1e-9
+
+
+@pytest.mark.parametrize("offset", [0.0, 0.2])
+def test_a_top_a_thousand_times_heavier(offset):
+    scene = sy.Scene()
+    for i in range(9):
+        box(scene, 0, 0.5 + i)
+    box(scene, offset, 9.5, density=1e6)
+    world, moved = settled(on_ground(scene))
+    assert moved < 1e-7
+    assert np.abs(world.bodies.velocity).max() < 1e-9
+
+
+def test_four_hundred_to_one_on_two_small_ones():
+    scene = sy.Scene()
+    box(scene, -0.6, 0.25, half=(0.25, 0.25, 0.25))
+    box(scene, 0.6, 0.25, half=(0.25, 0.25, 0.25))
+    top = box(scene, 0, 1.0, half=(1, 0.5, 0.5), density=400 * 125 / 2)
+    assert top.mass == pytest.approx(400 * 125)
+    world, moved = settled(on_ground(scene))
+    assert moved < 1e-7
+    assert np.abs(world.bodies.velocity).max() < 1e-9
+
+
+@pytest.mark.slow
+def test_a_pyramid_of_ten_stands_for_a_minute():
+    scene = sy.Scene()
+    for i in range(10):
+        for j in range(10 - i):
+            box(scene, 1.05 * (j - (9 - i) / 2), 0.5 + i)
+    world, moved = settled(on_ground(scene), seconds=60.0)
+    assert moved < 1e-6
+    assert np.abs(world.bodies.velocity).max() < 1e-9
+
+
+@pytest.mark.parametrize(("overhang", "stands"), [(0.49, True), (0.51, False)])
+def test_an_overhanging_box_falls_beyond_its_middle(overhang, stands):
+    scene = sy.Scene()
+    box(scene, 0, 0.5)
+    box(scene, overhang, 1.5)
+    world = sy.World(on_ground(scene))
+    world.step(180)
+    assert (world.bodies.position[0, 1, 1] > 1.49) == stands
+
+
+@pytest.mark.parametrize(("factor", "stands"), [(1.02, True), (0.98, False)])
+def test_a_leaning_plank_stands_by_friction(factor, stands):
+    """A plank against a wall without friction: moments about its lower end give mu (2 y + r) = x."""
+    angle = math.radians(60)
+    half = 1.0
+    scene = sy.Scene()
+    turn = (math.cos(angle / 2), 0, 0, math.sin(angle / 2))
+    r = 0.05
+    plank = sy.Part(shape=sy.Capsule(r, half), orientation=(math.sqrt(0.5), 0, 0, -math.sqrt(0.5)))
+    x, y = half * math.cos(angle), half * math.sin(angle)
+    mu = factor * x / (2.0 * y + r)
+    scene.add(
+        sy.Body(position=(-x - r, y + r, 0), orientation=turn, parts=plank, velocity=(0, 0, 0))
+    )
+    scene.add(sy.Ground(friction=mu))
+    scene.add(sy.Ground(normal=(-1, 0, 0), height=0.0))
+    world = sy.World(scene)
+    world.step(300)
+    fell = y + r - world.bodies.position[0, 0, 1]
+    assert (fell < 1e-4) if stands else (fell > 0.05)
+
+
+# Heaps
+
+
+def heap(seed, count=30, spread=1000.0):
+    """Boxes of random sizes, densities and turns above the ground."""
+    rng = np.random.default_rng(seed)
+    scene = sy.Scene()
+    for i in range(count):
+        density = 1000.0 * spread ** (rng.uniform() - 0.5)
+        box(
+            scene, rng.uniform(-1, 1), 0.8 + 0.75 * i, rng.uniform(-1, 1), half=tuple(rng.uniform(0.2, 0.5, 3)),
+            density=density, orientation=tuple(rng.normal(size=4)), velocity=tuple(rng.normal(size=3)),
+            angular_velocity=tuple(2 * rng.normal(size=3)),
+        )  # fmt: skip
+    return on_ground(scene, friction=0.5)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_tumbling_heap_settles_without_a_failed_solve(seed):
+    world = sy.World(heap(seed))
+    energy = first = world.energy[0]
+    for _ in range(60):
+        world.step(10)
+        assert world.energy[0] <= energy + 1e-5 * first
+        energy = world.energy[0]
+    assert world.health[0] == 0
+    assert np.abs(world.bodies.velocity).max() < 1e-3
+    # Nothing fell through: the thinnest half edge is .2 m.
+    assert world.bodies.position[0, :, 1].min() > 0.19
+
+
+def test_deep_overlaps_part_without_a_burst():
+    scene = sy.Scene()
+    box(scene, 0, 0.5)
+    box(scene, 0.1, 0.9, orientation=(1, 0.05, 0, 0.02))
+    scene.add(sy.Body(position=(0.05, 1.1, 0.3), parts=sy.Sphere(0.3)))
+    world = sy.World(on_ground(scene))
+    before = world.energy[0]
+    highest = before
+    for _ in range(300):
+        world.step(1)
+        highest = max(highest, world.energy[0])
+    assert world.health[0] == 0
+    # Parting lifts what lies above: one box by 1 m at most.
+    assert highest < before + 1000 * 9.81 * 1.5
+    assert np.abs(world.bodies.velocity).max() < 4.0
+
+
+# Particles, capsules, scenery
+
+
+def test_particles_and_bodies_hold_each_other():
+    scene = sy.Scene()
+    ball = scene.add(sy.Particle(position=(0, 0.2, 0), radius=0.2, mass=5.0))
+    tray = box(scene, 0, 0.5, half=(1.0, 0.1, 1.0))
+    for x, z in ((-0.8, -0.8), (-0.8, 0.8), (0.8, 0.0)):
+        scene.add(sy.Particle(position=(x, 0.2, z), radius=0.2, mass=1.0))
+    world = sy.World(on_ground(scene))
+    world.step(120)
+    assert np.abs(world.bodies.velocity).max() < 1e-6
+    load = world.contacts.force_on(world.scene.of(sy.Ground)[0])[0, 1]
+    assert load == pytest.approx(-9.81 * (tray.mass + 8.0), rel=1e-6)
+    assert world.particles.position[0, 0] == pytest.approx(ball.position, abs=1e-6)
+
+
+def test_a_ball_rolls_down_an_immovable_ramp():
+    slope = 0.3
+    scene = sy.Scene()
+    scene.add(
+        sy.Body(
+            position=(0, 0, 0), inverse_mass=0, parts=sy.Box((20, 0.5, 2)),
+            orientation=(math.cos(slope / 2), 0, 0, -math.sin(slope / 2)),
+        )
+    )  # fmt: skip
+    up = np.array([math.sin(slope), math.cos(slope), 0])
+    scene.add(sy.Body(position=tuple(0.75 * up), parts=sy.Sphere(0.25)))
+    scene.add(sy.Collisions(friction=0.8))
+    world = sy.World(scene)
+    world.step(120)
+    speed = np.linalg.norm(world.bodies.velocity[0, 1])
+    assert speed == pytest.approx(5 / 7 * 9.81 * math.sin(slope) * 2.0, rel=1e-6)
+
+
+@pytest.mark.parametrize("speed", [1.0, 30.0, 300.0, 1000.0])
+def test_a_bullet_does_not_pass_a_wall_of_a_millimetre(speed):
+    rng = np.random.default_rng(int(speed))
+    for _ in range(5):
+        scene = sy.Scene(gravity=(0, 0, 0))
+        scene.add(sy.Body(position=(0, 0, 0), inverse_mass=0, parts=sy.Box((5e-4, 50.0, 50.0))))
+        aim = np.array([1.0, *rng.uniform(-0.3, 0.3, 2)])
+        scene.add(
+            sy.Body(
+                position=(-rng.uniform(0.1, 5.0), 0, 0), velocity=tuple(speed * aim / np.linalg.norm(aim)),
+                parts=sy.Sphere(0.05),
+            )
+        )  # fmt: skip
+        scene.add(sy.Collisions())
+        world = sy.World(scene)
+        world.step(max(3, round(8.0 / speed * 60)))
+        assert world.bodies.position[0, 1, 0] == pytest.approx(-0.0505, abs=1e-6)
+
+
+# Batches
+
+
+def test_worlds_do_not_depend_on_their_neighbours_or_threads():
+    scene = heap(1, count=6)
+    alone = sy.World(scene)
+    many = sy.World(scene, worlds=13, threads=3)
+    alone.bodies.velocity[0, 2] += (1.0, 2.0, 3.0)
+    many.bodies.velocity[5, 2] += (1.0, 2.0, 3.0)
+    many.bodies.velocity[7, 3] += (0.0, 9.0, 3.0)
+    for world in (alone, many):
+        world.step(60)
+        world.step(60)
+    np.testing.assert_array_equal(many.state[:, 5], alone.state[:, 0])
+    assert not np.array_equal(many.state[:, 7], alone.state[:, 0])
+
+
+def test_steps_and_snapshots_go_on_to_the_bit():
+    one, other = sy.World(heap(2, count=6)), sy.World(heap(2, count=6))
+    one.step(90)
+    other.step(30)
+    kept = other.snapshot()
+    other.step(60)
+    np.testing.assert_array_equal(one.state, other.state)
+    other.restore(kept)
+    other.step(60)
+    np.testing.assert_array_equal(one.state, other.state)
+
+
+def test_friction_restitution_and_radius_can_differ_between_worlds():
+    scene = sy.Scene()
+    box(scene, 0, 0.5, velocity=(2, 0, 0))
+    ground = scene.add(sy.Ground(friction=0.1))
+    world = sy.World(scene, worlds=3)
+    world[ground].friction = [0.1, 0.2, 0.4]
+    world.step(20)
+    lost = 2.0 - world.bodies.velocity[:, 0, 0]
+    np.testing.assert_allclose(lost, 9.81 / 3 * np.array([0.1, 0.2, 0.4]), rtol=1e-3)
+
+
+# Limits and refusals
+
+
+def test_a_full_buffer_is_flagged_and_keeps_the_deepest():
+    scene = sy.Scene()
+    for i in range(3):
+        box(scene, 0, 0.5 + i)
+    world = sy.World(
+        on_ground(scene), method=sy.Method(sy.Rattle(), sy.ProximalNewton(contacts=11))
+    )
+    world.step(3)
+    assert world.health[0] == 8
+    assert world.contacts.count[0] == 11
+    assert np.isfinite(world.state[:, 0]).all()
+
+
+def test_what_cannot_be_is_refused():
+    scene = sy.Scene()
+    box(scene, 0, 0.5)
+    ground = scene.add(sy.Ground())
+    with pytest.raises(
+        ValueError, match=r"Direct cannot hold a Ground that meets a Body.*ProximalNewton"
+    ):
+        sy.World(scene, method=sy.Method(sy.Rattle(), sy.Direct()))
+    with pytest.raises(ValueError, match="SymplecticEuler does not work with ProximalNewton"):
+        sy.World(scene, method=sy.Method(sy.SymplecticEuler(), sy.ProximalNewton()))
+    with pytest.raises(ValueError, match="slop is 0"):
+        sy.ProximalNewton(slop=0.0)
+    with pytest.raises(ValueError, match="contacts is 0"):
+        sy.ProximalNewton(contacts=0)
+    scene.add(sy.Particle(position=(0, 3, 0)))
+    scene.add(sy.RodConstraint(scene.particles[0], anchor=(0, 4, 0), length=1.0))
+    with pytest.raises(ValueError, match="ProximalNewton cannot hold a RodConstraint"):
+        sy.World(scene)
+    bare = sy.Scene()
+    bare.add(sy.Body(position=(0, 1, 0), mass=1.0, inertia=(1, 1, 1)))
+    bare.add(sy.Ground())
+    with pytest.raises(ValueError, match="has 0 parts"):
+        sy.World(bare)
+    bare.remove(bare.of(sy.Ground)[0])
+    with pytest.raises(ValueError, match="keeps no list of contacts"):
+        _ = sy.World(bare).contacts
+    assert ground.particles is None
