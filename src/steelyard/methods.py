@@ -14,6 +14,7 @@ from .scene import checks
 from .scene.body_forces import SURFACES
 from .scene.contacts import Collisions, ContactGenerator, Ground, LinePlatform
 from .scene.forces import Drag, Explosion, StiffSpring, UserForce
+from .scene.joints import JOINTS
 from .scene.links import Cable, CableConstraint
 from .scene.rider import Rider
 from .scene.scene import CONTACTS, FORCES, LINKS, SPRINGS, Scene
@@ -164,6 +165,17 @@ class Method:
     def _refuse_bodies(self, name: str, scene: Scene) -> None:
         """Raise if contacts of bodies have no solver, or a solver of these something else to hold."""
         rigid = self.solver is not None and self.solver.rigid
+        for joint in scene.of(*JOINTS):
+            if not rigid:
+                raise ValueError(
+                    f"{name} with {type(self.solver).__name__} cannot hold a {type(joint).__name__}; it needs a solver "
+                    "of joints. Use Method(Rattle(), ProximalNewton())."
+                )
+            for thing in scene.of(StiffSpring):
+                raise ValueError(
+                    f"{type(self.solver).__name__} cannot step a {type(thing).__name__} beside a "
+                    f"{type(joint).__name__}. Use AnchoredSpring."
+                )
         solver = type(self.solver).__name__
         if not rigid:
             for contact in scene.of(Ground, Collisions):
@@ -237,7 +249,7 @@ DEFAULT_RIGID = Method(Rattle(), ProximalNewton())
 def default_for(scene: Scene) -> Method:
     """The method of a world that is given none."""
     touching = any(scene.bodies_at(contact) for contact in scene.of(Ground, Collisions))
-    return DEFAULT_RIGID if touching else DEFAULT
+    return DEFAULT_RIGID if touching or scene.of(*JOINTS) else DEFAULT
 
 
 __all__ = [

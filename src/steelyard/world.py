@@ -12,12 +12,14 @@ from .choice import Choice, choose_method
 from .diagnostics.contacts import Contacts, contacts_of
 from .diagnostics.energy import world_energy
 from .diagnostics.health import health_flags
+from .diagnostics.joints import Joints, joints_of
 from .diagnostics.residual import link_residuals
 from .math.pointers import LANES
 from .methods import Method, default_for
 from .model.compile import Model, compile_model
 from .model.parameters import BODIES, PARTICLES, Key
 from .model.tape import H_BODIES_DAMPED, H_DAMPED
+from .queries.ask import Queries
 from .scene import checks
 from .scene.body import Body
 from .scene.contacts import ContactGenerator
@@ -369,6 +371,16 @@ class World:
             ValueError: this world's method keeps no list of contacts.
         """
         return contacts_of(self)
+
+    @property
+    def joints(self) -> Joints:
+        """What joints bear after the last step, how far they are open, and where what they leave free stands."""
+        return joints_of(self)
+
+    @property
+    def queries(self) -> Queries:
+        """Casts, overlaps and lines of sight in all worlds; none of them changes anything."""
+        return Queries(self)
 
     # State
 

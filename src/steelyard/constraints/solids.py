@@ -5,17 +5,31 @@ A particle is a solid that does not turn, a body with a pivot one that only turn
 
 from __future__ import annotations
 
+from math import sqrt
+
+from ..integrators.rotor import turn_freely
 from ..kernel import inner
+from ..math.lanes import splat
 from ..math.pointers import LANES
 from ..model.rigid_layout import (
+    JOINTS,
+    PACK_ROW,
+    S_BASE,
+    S_END,
+    S_END_ROTATION,
     S_FREE,
+    S_GEOMETRIC,
     S_INERTIA,
     S_INVERSE,
     S_INVERSE_INERTIA,
+    S_JOINED,
     S_MASS,
+    S_MIDDLE,
     S_MOVES,
     S_PLACE,
     S_ROTATION,
+    S_STEP,
+    S_TURN,
     S_TURNS,
     S_VELOCITY,
     SOLID,
@@ -43,12 +57,12 @@ def symmetric_times(s, at, x, y, z):
 
 
 @inner
-def _rotation(s, q, k, out):
-    """Nine entries of the rotation matrix, row by row, of the quaternion in rows ``q`` of lane k."""
-    w = s[LANES * q + k]
-    x = s[LANES * (q + 1) + k]
-    y = s[LANES * (q + 2) + k]
-    z = s[LANES * (q + 3) + k]
+def _rotation(s, q, stride, out):
+    """Nine entries of the rotation matrix, row by row, of the quaternion at entry ``q`` and every ``stride`` on."""
+    w = s[q]
+    x = s[q + stride]
+    y = s[q + 2 * stride]
+    z = s[q + 3 * stride]
     two = 2.0 / (w * w + x * x + y * y + z * z)
     s[out] = 1.0 - two * (y * y + z * z)
     s[out + 1] = two * (x * y - w * z)
@@ -106,7 +120,7 @@ def gather_solids(tape, s, rigid, k):
         s[at + S_MOVES] = 1.0 if moves else 0.0
         s[at + S_TURNS] = 1.0 if turns else 0.0
         if q >= 0:
-            _rotation(s, q, k, at + S_ROTATION)
+            _rotation(s, LANES * q + k, LANES, at + S_ROTATION)
         else:
             for c in range(9):
                 s[at + S_ROTATION + c] = 1.0 if c % 4 == 0 else 0.0
@@ -126,8 +140,21 @@ def gather_solids(tape, s, rigid, k):
                 s[at + S_INVERSE_INERTIA + c] = 0.0
             for c in range(3):
                 s[at + S_FREE + 3 + c] = 0.0
+        for c in range(6):
+            s[at + S_VELOCITY + c] = 0.0
+            s[at + S_STEP + c] = 0.0
+            s[at + S_GEOMETRIC + c] = 0.0
+            s[at + S_BASE + c] = 0.0
+            s[at + S_JOINED + c] = 0.0
         record += SOLID
         at += SOLID_ENTRIES
+    if tape[rigid + JOINTS] > 0:
+        # One more: the world, to which joints may hold.
+        for c in range(SOLID_ENTRIES):
+            s[at + c] = 0.0
+        for c in range(3):
+            s[at + S_ROTATION + 4 * c] = 1.0
+            s[at + S_END_ROTATION + 4 * c] = 1.0
 
 
 @inner
@@ -146,3 +173,173 @@ def scatter_velocities(tape, s, rigid, k):
                 s[LANES * (tape[record + 3] + c) + k] += s[at + S_VELOCITY + 3 + c]
         record += SOLID
         at += SOLID_ENTRIES
+
+
+@inner
+def drift_solids(tape, s, rigid, k, dt):
+    """Where the impulses of the base move all solids of lane k to within the step: eight of them turn at once."""
+    solids = tape[rigid + SOLIDS]
+    pack = tape[rigid + PACK_ROW]
+    for first in range(0, solids, LANES):
+        for lane in range(LANES):
+            i = first + lane
+            record = tape[rigid + SOLID_RECORDS] + SOLID * i
+            turns = i < solids and (tape[record + 7] & 2) != 0
+            at = solid_at(tape, rigid, i)
+            for c in range(4):
+                s[LANES * (pack + c) + lane] = (
+                    s[LANES * (tape[record + 1] + c) + k] if turns else (1.0 if c == 0 else 0.0)
+                )
+            for c in range(3):
+                s[LANES * (pack + 4 + c) + lane] = (
+                    s[LANES * (tape[record + 3] + c) + k] + s[at + S_BASE + 3 + c] if turns else 0.0
+                )
+            for c in range(6):
+                s[LANES * (pack + 7 + c) + lane] = (
+                    s[LANES * (tape[record + 6] + c) + k] if turns else 0.0
+                )
+        turn_freely(s, pack + 13, pack, pack + 4, pack + 7, splat(dt))
+        for lane in range(min(LANES, solids - first)):
+            i = first + lane
+            at = solid_at(tape, rigid, i)
+            record = tape[rigid + SOLID_RECORDS] + SOLID * i
+            for c in range(3):
+                v = 0.0
+                if s[at + S_MOVES] != 0.0:
+                    v = (
+                        s[LANES * (tape[record + 2] + c) + k]
+                        + s[at + S_INVERSE] * s[at + S_BASE + c]
+                    )
+                s[at + S_STEP + c] = v
+                s[at + S_END + c] = s[at + S_PLACE + c] + dt * v
+            # The velocity that the impulses make where rows take them: of the start, or midway.
+            x, y, z = symmetric_times(
+                s, at + S_INVERSE_INERTIA, s[LANES * (pack + 4) + lane], s[LANES * (pack + 5) + lane],
+                s[LANES * (pack + 6) + lane],
+            )  # fmt: skip
+            s[at + S_STEP + 3] = x
+            s[at + S_STEP + 4] = y
+            s[at + S_STEP + 5] = z
+            if s[at + S_TURNS] != 0.0:
+                for c in range(4):
+                    s[at + S_TURN + c] = s[LANES * (pack + c) + lane]
+                _rotation(s, at + S_TURN, 1, at + S_END_ROTATION)
+            else:
+                for c in range(9):
+                    s[at + S_END_ROTATION + c] = s[at + S_ROTATION + c]
+
+
+@inner
+def end_drift(tape, s, rigid, k):
+    """Put all solids of lane k where ``drift_solids`` moved them."""
+    for i in range(tape[rigid + SOLIDS]):
+        record = tape[rigid + SOLID_RECORDS] + SOLID * i
+        at = solid_at(tape, rigid, i)
+        if s[at + S_MOVES] != 0.0:
+            for c in range(3):
+                s[LANES * (tape[record] + c) + k] = s[at + S_END + c]
+        if s[at + S_TURNS] != 0.0:
+            for c in range(4):
+                s[LANES * (tape[record + 1] + c) + k] = s[at + S_TURN + c]
+
+
+@inner
+def linearise_turns(tape, s, rigid, k):
+    """Take inertia from the middle of the step, and add geometric stiffness g, times the step, to it.
+
+    So a solve for changes sees how pulls change as solids turn: where nothing is left to change, g does nothing.
+    """
+    for i in range(tape[rigid + SOLIDS]):
+        at = solid_at(tape, rigid, i)
+        if s[at + S_TURNS] != 0.0:
+            record = tape[rigid + SOLID_RECORDS] + SOLID * i
+            # The mean of the quaternions of start and end, to any length.
+            sign = 0.0
+            for c in range(4):
+                sign += s[LANES * (tape[record + 1] + c) + k] * s[at + S_TURN + c]
+            sign = 1.0 if sign >= 0.0 else -1.0
+            q = at + S_STEP
+            for c in range(4):
+                s[q + c] = s[LANES * (tape[record + 1] + c) + k] + sign * s[at + S_TURN + c]
+            _rotation(s, q, 1, at + S_MIDDLE)
+            _turned(s, tape[record + 5], k, at + S_MIDDLE, at + S_INERTIA)
+            for e in range(6):
+                s[at + S_INERTIA + e] += s[at + S_GEOMETRIC + e]
+            _invert(s, at + S_INERTIA, at + S_INVERSE_INERTIA)
+
+
+@inner
+def _invert(s, at, out):
+    """Inverse of a symmetric matrix in six entries (xx, yx, yy, zx, zy, zz)."""
+    a = s[at + 2] * s[at + 5] - s[at + 4] * s[at + 4]
+    b = s[at + 3] * s[at + 4] - s[at + 1] * s[at + 5]
+    c = s[at + 1] * s[at + 4] - s[at + 2] * s[at + 3]
+    inverse = 1.0 / (s[at] * a + s[at + 1] * b + s[at + 3] * c)
+    yy = s[at] * s[at + 5] - s[at + 3] * s[at + 3]
+    zy = s[at + 1] * s[at + 3] - s[at] * s[at + 4]
+    zz = s[at] * s[at + 2] - s[at + 1] * s[at + 1]
+    s[out] = a * inverse
+    s[out + 1] = b * inverse
+    s[out + 2] = yy * inverse
+    s[out + 3] = c * inverse
+    s[out + 4] = zy * inverse
+    s[out + 5] = zz * inverse
+
+
+@inner
+def kinetic_energy(tape, s, rigid, field):
+    """Of all solids by a six-vector of velocities [J]."""
+    total = 0.0
+    for i in range(tape[rigid + SOLIDS]):
+        at = solid_at(tape, rigid, i)
+        v = at + field
+        square = s[v] * s[v] + s[v + 1] * s[v + 1] + s[v + 2] * s[v + 2]
+        x, y, z = symmetric_times(s, at + S_INERTIA, s[v + 3], s[v + 4], s[v + 5])
+        turning = x * s[v + 3] + y * s[v + 4] + z * s[v + 5]
+        total += 0.5 * (s[at + S_MOVES] * s[at + S_MASS] * square + s[at + S_TURNS] * turning)
+    return total
+
+
+@inner
+def rest_solids(tape, s, rigid):
+    """Free velocities of nothing."""
+    for i in range(tape[rigid + SOLIDS]):
+        at = solid_at(tape, rigid, i)
+        for c in range(6):
+            s[at + S_FREE + c] = 0.0
+
+
+@inner
+def move_solids(tape, s, rigid, k, dt):
+    """Move solids in lane k by their velocities over dt."""
+    record = tape[rigid + SOLID_RECORDS]
+    for i in range(tape[rigid + SOLIDS]):
+        at = solid_at(tape, rigid, i)
+        flags = tape[record + 7]
+        if flags & 1 != 0:
+            for c in range(3):
+                s[LANES * (tape[record] + c) + k] += dt * s[at + S_VELOCITY + c]
+        if flags & 2 != 0:
+            _turn(s, tape[record + 1], k, dt, at + S_VELOCITY + 3)
+        record += SOLID
+
+
+@inner
+def _turn(s, q, k, dt, at):
+    """Turn a quaternion in lane k by an angular velocity over dt."""
+    w = s[LANES * q + k]
+    x = s[LANES * (q + 1) + k]
+    y = s[LANES * (q + 2) + k]
+    z = s[LANES * (q + 3) + k]
+    a = 0.5 * dt * s[at]
+    b = 0.5 * dt * s[at + 1]
+    c = 0.5 * dt * s[at + 2]
+    nw = w - a * x - b * y - c * z
+    nx = x + a * w + b * z - c * y
+    ny = y + b * w + c * x - a * z
+    nz = z + c * w + a * y - b * x
+    inverse = 1.0 / sqrt(nw * nw + nx * nx + ny * ny + nz * nz)
+    s[LANES * q + k] = nw * inverse
+    s[LANES * (q + 1) + k] = nx * inverse
+    s[LANES * (q + 2) + k] = ny * inverse
+    s[LANES * (q + 3) + k] = nz * inverse

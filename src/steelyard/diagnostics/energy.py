@@ -16,6 +16,7 @@ from ..scene.forces import (
     UserForce,
 )
 from ..scene.scene import SPRINGS
+from .joints import drive_energy
 from .spans import place_of, spans, values
 
 if TYPE_CHECKING:
@@ -40,7 +41,7 @@ def potential_energy(world: World) -> np.ndarray:
     """
     particles = world.particles
     height = (particles.acceleration * particles.position).sum(axis=2)
-    total = _springs(world) - (particles.mass_or_zero * height).sum(axis=1)
+    total = _springs(world) + drive_energy(world) - (particles.mass_or_zero * height).sum(axis=1)
     if world.scene.bodies:
         bodies = world.bodies
         height = (bodies.acceleration * bodies.centre).sum(axis=2)

@@ -27,6 +27,7 @@ class Acting(NamedTuple):
     thrusts: bool = False
     surfaces: bool = False
     explosions: bool = False
+    joints: bool = False
 
     @property
     def particles_forced(self) -> bool:

@@ -27,7 +27,7 @@ from .network import Network
 from .parameters import PARTICLES, Key, Parameters, Slot
 from .propagators import add_propagators
 from .rigid import Rigid
-from .rigid_layout import COLLIDER, PAIR, SOLID
+from .rigid_layout import COLLIDER, JOINT, PAIR, SOLID
 from .saddle import Saddle
 from .stiffness import Stiffness
 from .tape import (
@@ -47,7 +47,7 @@ from .tape import (
 _ABSENT = ("user_forces", "force", "start", "free", "impulse", "dense", "now", "rigid")
 
 
-@dataclass
+@dataclass(eq=False)
 class Model:
     """What is constant while worlds step.
 
@@ -115,7 +115,7 @@ class Compiler:
             "winches": 3, "movers": 5, "links": LINK, "contacts": CONTACT, "generators": 2,
             "recipe": 2, "unknowns": 4, "spring_blocks": 4, "drag_blocks": 1, "float_blocks": 1,
             "bodies": BODY, "points": BODY_POINT, "wrenched": WRENCHED, "applied": 3, "thrusts": 5, "surfaces": 8,
-            "explosions": 4, "solids": SOLID, "colliders": COLLIDER, "pairs": PAIR,
+            "explosions": 4, "solids": SOLID, "colliders": COLLIDER, "pairs": PAIR, "joints": JOINT,
             "propagators": 2, "parts": 2, "compliances": COMPLIANCE, "kinks": KINK,
         }  # fmt: skip
         self.next_row = 0
@@ -420,6 +420,7 @@ class Compiler:
             thrusts=bool(sections["thrusts"]),
             surfaces=bool(sections["surfaces"]),
             explosions=bool(sections["explosions"]),
+            joints=bool(sections.get("joints")),
         )
 
     def some(self, chosen: Any) -> list[Particle]:
@@ -434,7 +435,7 @@ class Compiler:
     def _method(self) -> None:
         """Codes and settings of the method, and the generators in the order they were added."""
         solver = self.method.solver
-        held = solver if self.header["constrained"] or (self.rigid and self.rigid.pairs) else None
+        held = solver if self.header["constrained"] or (self.rigid and self.rigid.active) else None
         recipe = self.method.integrator.recipe(held, self._acting())
         self.sections["recipe"] = self._words(recipe)
         self.model.recipe = recipe
@@ -487,7 +488,7 @@ class Compiler:
         self.header["blocks"] = self.model.blocks
         self.header["ends"] = self.model.blocks + tape.WORDS
         self.model.skip = self.header["ends"] + self.header["contacts_most"]
-        if self.rigid is not None and self.rigid.pairs:
+        if self.rigid is not None and self.rigid.active:
             self._integers = self.model.skip
             self.model.skip += self.rigid.integers
 
@@ -498,7 +499,7 @@ class Compiler:
         }
         body: list[int] = []
         for name in names:
-            if name == "rigid" and self.rigid is not None and self.rigid.pairs:
+            if name == "rigid" and self.rigid is not None and self.rigid.active:
                 # Last of all: it knows where the others stand.
                 self.header[name] = HEADER + len(body)
                 body += self.rigid.place(self._integers, self.header)

@@ -9,9 +9,11 @@ import numpy as np
 
 from ..collision.contact_list import PLACED_ENTRIES
 from ..collision.narrow_phase import ALL_POINTS, MOST_POINTS, POINT, WORK
+from ..integrators.rotor import ROTOR_ROWS
 from ..math.pointers import LANES
 from ..scene.body import Body
 from ..scene.contacts import Collisions, Ground
+from ..scene.joints import JOINTS, DistanceJoint, named_drives
 from ..scene.particle import Particle
 from ..solvers.block_cholesky import SIX
 from . import rigid_layout as at
@@ -27,12 +29,21 @@ _POINTS = {SPHERE: 1, CAPSULE: 2}
 _USUAL = 16
 
 
+_SECTIONS = ("solids", "colliders", "pairs", "joints")
+
+
+def _rows(joint: Any) -> int:
+    """Rows that a joint may have."""
+    return len(joint.locked) + at.DRIVE_ROWS * len(joint.drives)
+
+
 class Rigid:
     """Colliders, pairs and rows of a scene whose solver holds contacts of bodies."""
 
     def __init__(self, c: Compiler) -> None:
         self._c = c
         self.colliders: Colliders = colliders_of(c.scene, points=True)
+        self.joints: list[Any] = c.scene.of(*JOINTS)
         self.pairs = self._pairs()
         self.capacity = self._capacity()
 
@@ -46,6 +57,7 @@ class Rigid:
         scene, colliders = self._c.scene, self.colliders
         everything = self._things
         pairs: list[tuple[int, int, Any]] = []
+        joined = {frozenset(map(id, joint.members())) for joint in self.joints if not joint.collide}
         for generator in scene.of(Ground, Collisions):
             chosen = everything if generator.particles is None else list(generator.particles)
             own = colliders.of(*chosen)
@@ -55,7 +67,8 @@ class Rigid:
                 continue
             for a, b in combinations(own, 2):
                 first, second = colliders.owner[a], colliders.owner[b]
-                if first is not second and (first.movable or second.movable):
+                apart = first is not second and frozenset((id(first), id(second))) not in joined
+                if apart and (first.movable or second.movable):
                     pairs.append((a, b, generator) if first.movable else (b, a, generator))
         return pairs
 
@@ -72,17 +85,31 @@ class Rigid:
         movable = sum(thing.movable for thing in self._things)
         return min(sum(each), _USUAL * movable)
 
+    @property
+    def active(self) -> bool:
+        """Whether there is anything to hold."""
+        return bool(self.pairs or self.joints)
+
     def state(self) -> None:
-        """Stored contacts, and whether some did not fit."""
-        if self.pairs:
-            self._c.state((RIGID, "contacts"), np.zeros(at.STORED * self.capacity))
-            self._c.state((RIGID, "overflow"), [0.0])
+        """Stored contacts, and whether some did not fit; impulses of joints, what drives them, and what is broken."""
+        c = self._c
+        if not self.active:
+            return
+        c.state((RIGID, "contacts"), np.zeros(at.STORED * self.capacity))
+        c.state((RIGID, "overflow"), [0.0])
+        c.state((RIGID, "bound"), np.zeros(sum(map(_rows, self.joints))))
+        for joint in self.joints:
+            c.state((joint, "broken"), [0.0])
+            c.state((joint, "force"), np.zeros(3))
+            c.state((joint, "torque"), np.zeros(3))
+            for prefix, drive in named_drives(joint):
+                c.state((joint, f"{prefix}speed"), [drive.speed])
 
     def build(self) -> None:
         """Records, numbers and work rows."""
         c = self._c
         c.header["rigid"] = -1
-        if not self.pairs:
+        if not self.active:
             return
         owner = self.colliders.owner
         c.model.met = tuple((owner[a], owner[b]) for a, b, _ in self.pairs)
@@ -99,9 +126,14 @@ class Rigid:
                     c.parameter(generator, "friction", generator.friction),
                 )
             pairs += [a, b, *surfaces[id(generator)]]
-        for name, records in (("solids", solids), ("colliders", colliders), ("pairs", pairs)):
-            c.sections[name] = records
         self._numbers()
+        joints: list[int] = []
+        first = 0
+        for joint in self.joints:
+            joints += self._joint(joint, first, index)
+            first += _rows(joint)
+        for name, records in zip(_SECTIONS, (solids, colliders, pairs, joints), strict=True):
+            c.sections[name] = records
         self._record(len(things))
 
     def _solid(self, thing: Body | Particle) -> list[int]:
@@ -143,7 +175,35 @@ class Rigid:
         reach[boxes] = np.linalg.norm(colliders.size[boxes], axis=1)
         geometry[:, at.G_REACH] = reach
         settings = np.array(self._c.method.solver.settings)  # type: ignore[union-attr]
-        self._c.model.numbers = np.concatenate([settings, geometry.ravel()])
+        ends = [
+            number
+            for joint in self.joints
+            for _, place, axes in joint.ends
+            for number in (*place, *axes.ravel())
+        ]
+        self._ends = len(settings) + geometry.size
+        self._c.model.numbers = np.concatenate([settings, geometry.ravel(), ends])
+
+    def _joint(self, joint: Any, first: int, index: dict[int, int]) -> list[int]:
+        """Record of a joint, whose rows begin at ``first``."""
+        c = self._c
+        ends = [-1 if thing is None else index[id(thing)] for thing, _, _ in joint.ends]
+        record = [
+            sum(1 << k for k in joint.locked), *ends,
+            self._ends + at.JOINT_NUMBERS * self.joints.index(joint), first, _rows(joint),
+            c.model.places[joint, "broken"][0], c.model.places[joint, "force"][0], c.model.places[joint, "torque"][0],
+            c.parameter(joint, "break_force", joint.break_force),
+            c.parameter(joint, "break_torque", joint.break_torque),
+            c.parameter(joint, "length", joint.length) if isinstance(joint, DistanceJoint) else -1,
+            len(joint.drives),
+        ]  # fmt: skip
+        for prefix, drive in named_drives(joint):
+            record += [drive.coordinate, c.model.places[joint, f"{prefix}speed"][0]]
+            record += [
+                c.parameter(joint, prefix + name, getattr(drive, name))
+                for name in ("strength", "low", "high", "stiffness", "damping", "rest")
+            ]
+        return record + [-1] * (at.JOINT - len(record))
 
     def _record(self, solids: int) -> None:
         """The record that holds it all together."""
@@ -162,7 +222,12 @@ class Rigid:
         words[at.OVERFLOW_ROW] = c.model.places[RIGID, "overflow"][0]
         words[at.CAPACITY] = capacity
         words[at.START_ROW] = c.take(6 * solids)
-        words[at.SOLID_WORK] = entries(at.SOLID_ENTRIES * solids)
+        words[at.JOINTS] = len(self.joints)
+        words[at.BOUND_ROW] = c.model.places[RIGID, "bound"][0]
+        words[at.ROW_WORK] = entries(at.ROW_ENTRIES * sum(map(_rows, self.joints)))
+        words[at.FRAME_WORK] = entries(at.FRAME_ENTRIES)
+        words[at.PACK_ROW] = c.take(13 + ROTOR_ROWS) if self.joints else -1
+        words[at.SOLID_WORK] = entries(at.SOLID_ENTRIES * (solids + 1))
         words[at.PLACED_WORK] = entries(PLACED_ENTRIES * len(self.colliders))
         words[at.CONTACT_WORK] = entries(at.CONTACT_ENTRIES * capacity)
         words[at.POINTS_WORK] = entries(POINT * ALL_POINTS)
@@ -170,10 +235,11 @@ class Rigid:
         words[at.MATRIX_ROW] = c.take(SIX * (solids * (solids + 1) // 2))
         words[at.VECTOR_ROW] = c.take(solids + 8)
         place = 0
+        bonds = capacity + len(self.joints)
         for word, size in (
-            (at.DEGREES, solids + 1), (at.ADJACENT, 2 * capacity), (at.ORDER, solids), (at.LOCAL, solids),
-            (at.FIRST, solids), (at.STARTS, solids), (at.END_A, capacity), (at.END_B, capacity),
-            (at.LIST, capacity), (at.MATCHED, capacity),
+            (at.DEGREES, solids + 1), (at.ADJACENT, 2 * bonds), (at.ORDER, solids), (at.LOCAL, solids),
+            (at.FIRST, solids), (at.STARTS, solids), (at.END_A, bonds), (at.END_B, bonds),
+            (at.LIST, capacity), (at.MATCHED, capacity), (at.HELD, len(self.joints)),
         ):  # fmt: skip
             words[word] = place
             place += size
@@ -184,7 +250,7 @@ class Rigid:
     def place(self, first: int, sections: dict[str, int]) -> list[int]:
         """The record's words, given where integers begin and where the sections stand on the tape."""
         words = dict(self.words)
-        for name in ("solids", "colliders", "pairs"):
+        for name in _SECTIONS:
             words[getattr(at, f"{name[:-1].upper()}_RECORDS")] = sections[name] + 1
         for word in range(at.DEGREES, at.RIGID_WORDS):
             words[word] += first

@@ -11,8 +11,9 @@ from __future__ import annotations
 (
     SOLIDS, SOLID_RECORDS, COLLIDERS, COLLIDER_RECORDS, PAIRS, PAIR_RECORDS, NUMBERS, STORED_ROW, CAPACITY,
     OVERFLOW_ROW, START_ROW, SOLID_WORK, PLACED_WORK, CONTACT_WORK, POINTS_WORK, NARROW_WORK, MATRIX_ROW, VECTOR_ROW,
-    DEGREES, ADJACENT, ORDER, LOCAL, FIRST, STARTS, END_A, END_B, LIST, MATCHED, RIGID_WORDS,
-) = range(29)  # fmt: skip
+    JOINTS, JOINT_RECORDS, ROW_WORK, FRAME_WORK, BOUND_ROW, PACK_ROW,
+    DEGREES, ADJACENT, ORDER, LOCAL, FIRST, STARTS, END_A, END_B, LIST, MATCHED, HELD, RIGID_WORDS,
+) = range(36)  # fmt: skip
 
 # Record of a solid (body or particle): rows of position, orientation, velocity, angular momentum, inverse mass, inertia
 # and its inverse, -1 where it has none; whether it moves (1) and turns (2).
@@ -21,6 +22,12 @@ SOLID = 8
 COLLIDER = 4
 # Record of a pair: colliders a and b, of which a can move; rows of restitution and friction.
 PAIR = 4
+# Record of a joint: locked coordinates as bits, solids a and b (or -1: the world), its numbers, first of its rows and
+# how many, state rows of whether it is broken, of its force and of its torque, rows of the force and torque that break
+# it and of its length, number of drives; and of each drive: coordinate, rows of speed, strength, limits, stiffness,
+# damping and rest.
+JOINT, DRIVE = 29, 8
+JOINT_BROKEN, JOINT_TORN, JOINT_LENGTH, JOINT_DRIVES, DRIVES_AT = 6, 9, 11, 12, 13
 
 # Settings, first of the numbers; then of every collider the place in its solid (3), turn (9), sizes (3), and the radius
 # of a ball about its centre that holds it.
@@ -44,7 +51,19 @@ S_PLACE, S_MASS, S_INVERSE, S_MOVES, S_TURNS, S_ROTATION, S_INERTIA, S_INVERSE_I
     24,
 )
 S_FREE, S_VELOCITY, S_STEP, S_GRADIENT, S_MOMENTUM, S_PUSH = 32, 40, 48, 56, 64, 72
-SOLID_ENTRIES = 80
+# Place and rotation at the end of the step, and orientation there; geometric stiffness times the step (6, as inertia)
+# and the rotation midway (9); impulses so far, those of joints among them, and those after the first solve.
+S_END, S_END_ROTATION, S_TURN, S_GEOMETRIC, S_MIDDLE, S_BASE, S_JOINED, S_KEPT = (
+    80,
+    84,
+    96,
+    100,
+    106,
+    116,
+    122,
+    128,
+)
+SOLID_ENTRIES = 136
 
 # Work of a contact: what the narrow phase writes (normal from b to a, gap, place, id), two tangents, arms, friction,
 # restitution, compliance, least normal velocity, impulses of the last pass and of this one along normal and tangents,
@@ -54,6 +73,25 @@ C_FRICTION, C_RESTITUTION, C_COMPLIANCE, C_LEAST, C_BEFORE, C_IMPULSE = 20, 21, 
 C_SPEED, C_CHANGE = 30, 33
 C_SHIFT, C_REBOUND, C_DERIVATIVE, C_WEIGHT, C_CLOSED, C_EARLIER = 36, 37, 38, 44, 45, 46
 CONTACT_ENTRIES = 48
+
+# Numbers of a joint's end: place and axes in its solid. Entries of a row of a joint: direction of its force, of its
+# torques on a and b, wanted velocity, compliance, impulse of the last pass and of this one, bounds of it, velocity and
+# its change, error, kind, mobility, stiffness and damping of a spring, what the passes before asked for and left, the
+# impulse of the first solve, and that which the base holds already.
+JOINT_NUMBERS = 24
+#: Frames of both ends, and behind them the sums from which passes are mixed.
+FRAME_ENTRIES = 56
+J_FORCE, J_TORQUE_A, J_TORQUE_B, J_LEAST, J_COMPLIANCE, J_BEFORE, J_IMPULSE = 0, 3, 6, 9, 10, 11, 12
+J_LOW, J_HIGH = 13, 14
+J_SPEED, J_CHANGE, J_ERROR, J_KIND, J_WEIGHT, J_STIFFNESS, J_DAMPING = 15, 16, 17, 18, 19, 20, 21
+#: Passes of which rows remember what they asked for and left.
+REMEMBERED = 5
+J_ASKED, J_LEFT = 22, 22 + REMEMBERED
+J_KEPT, J_OFFSET = 32, 33
+ROW_ENTRIES = 34
+#: Rows of a drive: two limits, motor, spring.
+DRIVE_ROWS = 4
+OFF, EQUAL, LIMIT, MOTOR, SPRING = 0.0, 1.0, 2.0, 3.0, 4.0
 
 # Rows of the state per contact: its id + 1, or 0 for none; impulse and place in the world; rebound.
 STORED = 8

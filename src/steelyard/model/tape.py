@@ -119,9 +119,10 @@ from __future__ import annotations
     H_SOLIDS,
     H_COLLIDERS,
     H_PAIRS,
+    H_JOINTS,
     H_RIGID,
-) = range(111)
-HEADER = 111
+) = range(112)
+HEADER = 112
 
 # Width of the records of links, contacts and springs that a solver holds; written field by field.
 LINK = 17

@@ -79,12 +79,14 @@ class Limit(Rule):
         least: smallest that is allowed.
         most: largest that is allowed.
         invertible: whether the inverse of each but 0 must be finite too.
+        infinite: whether they may be infinite.
     """
 
     above: float | None = None
     least: float | None = None
     most: float | None = None
     invertible: bool = False
+    infinite: bool = False
 
     def __str__(self) -> str:
         if self.most is not None:
@@ -95,11 +97,12 @@ class Limit(Rule):
         else:
             bounds = f"at least {self.least:g}" if self.least is not None else ""
         inverse = "of finite inverse" if self.invertible else ""
-        return " and ".join(filter(None, ["finite", bounds, inverse]))
+        first = "a number" if self.infinite else "finite"
+        return " and ".join(filter(None, [first, bounds, inverse]))
 
     def broken(self, value: np.ndarray) -> np.ndarray:
         """Where the limit does not hold, of the shape of ``value``."""
-        good = np.isfinite(value)
+        good = ~np.isnan(value) if self.infinite else np.isfinite(value)
         if self.above is not None:
             good = good & (value > self.above)
         if self.least is not None:

@@ -30,6 +30,7 @@ from .forces import (
     StiffSpring,
     UserForce,
 )
+from .joints import JOINTS
 from .links import Cable, CableConstraint, Rod, RodConstraint
 from .particle import Particle
 from .rider import Rider
@@ -49,13 +50,16 @@ FORCES = (
     Explosion,
     UserForce,
 )
-KINDS = (Particle, Body, Rider, *LINKS, *CONTACTS, *FORCES, *BODY_FORCES)
+KINDS = (Particle, Body, Rider, *LINKS, *JOINTS, *CONTACTS, *FORCES, *BODY_FORCES)
 
 Thing = TypeVar("Thing")
 
 
 def members(thing: Any) -> Iterator[Particle | Body]:
     """The particles and bodies that a link, rider, contact generator or force refers to."""
+    if isinstance(thing, JOINTS):
+        yield from thing.members()
+        return
     for name in ("a", "b", "particle", "point", "body"):
         if hasattr(thing, name):
             end = getattr(thing, name)

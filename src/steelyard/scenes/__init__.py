@@ -5,6 +5,7 @@ from .bridge import bridge, bridge_weights
 from .cloth import cloth
 from .loads import bilinear_weights, lumped_masses
 from .platform import platform
+from .ragdoll import ragdoll
 
 __all__ = [
     "SHOTS",
@@ -15,4 +16,5 @@ __all__ = [
     "cloth",
     "lumped_masses",
     "platform",
+    "ragdoll",
 ]

@@ -13,6 +13,7 @@ from ..model.rigid_layout import (
     END_A,
     END_B,
     FIRST,
+    HELD,
     LIST,
     LOCAL,
     ORDER,
@@ -26,7 +27,7 @@ _UNSEEN, _SEEN, _DONE = -1, -2, -3
 
 @inner
 def join(tape, n, rigid, count):
-    """Contacts of every solid, as lists one behind the other; no solid belongs to an island yet."""
+    """Bonds of every solid, contacts and then joints, as lists one behind the other; no solid has an island yet."""
     solids = tape[rigid + SOLIDS]
     degrees = tape[rigid + DEGREES]
     adjacent = tape[rigid + ADJACENT]
@@ -83,11 +84,13 @@ def _visit(tape, n, rigid, seed, mark):
 
 
 @inner
-def gather_island(tape, n, rigid, seed):
-    """The island of a solid: its solids in order of elimination, its contacts, and the factor's envelope.
+def gather_island(tape, n, rigid, seed, count):
+    """The island of a solid: its solids in order of elimination, contacts, joints, and the factor's envelope.
+
+    Bonds from ``count`` on are joints.
 
     Returns:
-        Numbers of solids and of contacts; the factor's rows.
+        Numbers of solids, contacts and joints; the factor's rows.
     """
     order = tape[rigid + ORDER]
     local = tape[rigid + LOCAL]
@@ -103,6 +106,7 @@ def gather_island(tape, n, rigid, seed):
         n[local + n[order + i]] = i
         n[first + i] = i
     contacts = 0
+    joints = 0
     for i in range(size):
         solid = n[order + i]
         for entry in range(n[degrees + solid], n[degrees + solid + 1]):
@@ -111,12 +115,16 @@ def gather_island(tape, n, rigid, seed):
             if other == solid:
                 other = n[tape[rigid + END_B] + contact]
             if other < 0 or n[local + other] < i:
-                n[tape[rigid + LIST] + contacts] = contact
-                contacts += 1
+                if contact < count:
+                    n[tape[rigid + LIST] + contacts] = contact
+                    contacts += 1
+                else:
+                    n[tape[rigid + HELD] + joints] = contact - count
+                    joints += 1
                 if other >= 0:
                     n[first + i] = min(n[first + i], n[local + other])
     rows = 0
     for i in range(size):
         n[tape[rigid + STARTS] + i] = rows
         rows += SIX * (i - n[first + i] + 1)
-    return size, contacts, rows
+    return size, contacts, joints, rows

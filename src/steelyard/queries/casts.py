@@ -1,0 +1,353 @@
+"""Casts: when a shape that moves along a straight line first touches another, which stands still.
+
+The gap between two convex shapes is a convex function of the way, so Newton's method from the start, where it is above
+0, comes nearer from one side and never passes the first root: it ends there, or where the gap no longer falls, which is
+a miss. Two boxes touch when their extents overlap on all fifteen axes across which faces and edges can part them: each
+gives an interval of the way.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+from ..collision.hierarchy import HEAD, ROOT, STACK, children, clear_tree, insert_leaf
+from ..collision.manifold import axis
+from ..collision.narrow_phase import ALL_POINTS, POINT, WORK, collide
+from ..kernel import inner, kernel
+from ..math.pointers import doubles_at
+from ..model.colliders import BOX, CAPSULE, HALF_SPACE, PLACED, SIZE, SPHERE
+
+# Newton's steps, and the gap [m] that is none, over the sizes at hand.
+_STEPS, _TOUCHING = 100, 1e-14
+_FAR = 1e300
+# Where the axes of two boxes are parallel, products of edges part nothing that faces do not.
+_PARALLEL = 1e-12
+# Gap [m], over the box's size, within which the places where two boxes touch are looked for.
+_MANIFOLD = 1e-7
+_OUT = 2 * PLACED
+_WORK = _OUT + ALL_POINTS * POINT
+#: Numbers to work in.
+MEMORY = _WORK + WORK
+#: Colliders from which on a tree is made.
+MANY = 16
+# Numbers of a hit: way, gap, normal, place.
+HIT = 8
+
+
+@inner
+def _nearest(m, kind_a, kind_b, margin):
+    """Index of the point of least gap, or -1 without any."""
+    count = collide(m, kind_a, 0, kind_b, PLACED, _OUT, _WORK, margin)
+    best = -1
+    for i in range(count):
+        if best < 0 or m[_OUT + POINT * i + 3] < m[_OUT + POINT * best + 3]:
+            best = i
+    return best
+
+
+@inner
+def _write(m, hit, way, index):
+    """A hit from a point."""
+    at = _OUT + POINT * index
+    hit[0] = way
+    hit[1] = m[at + 3]
+    for k in range(3):
+        hit[2 + k] = m[at + k]
+        hit[5 + k] = m[at + 4 + k]
+
+
+@inner
+def _cast_convex(m, kind_a, kind_b, x, y, z, dx, dy, dz, reach, hit):
+    """By the gap: way to the first touch, or a far one; the point is written."""
+    size = m[SIZE] + m[SIZE + 1] + m[PLACED + SIZE] + m[PLACED + SIZE + 1] + m[PLACED + SIZE + 2]
+    size += abs(x) + abs(y) + abs(z) + abs(m[PLACED]) + abs(m[PLACED + 1]) + abs(m[PLACED + 2])
+    way = 0.0
+    for _ in range(_STEPS):
+        m[0] = x + way * dx
+        m[1] = y + way * dy
+        m[2] = z + way * dz
+        index = _nearest(m, kind_a, kind_b, _FAR)
+        if index < 0:
+            return _FAR
+        at = _OUT + POINT * index
+        gap = m[at + 3]
+        if gap <= _TOUCHING * size:
+            _write(m, hit, way, index)
+            return way
+        slope = m[at] * dx + m[at + 1] * dy + m[at + 2] * dz
+        if slope >= 0.0:
+            return _FAR
+        step = -gap / slope
+        if way + step > reach:
+            return _FAR
+        if way + step == way:
+            _write(m, hit, way, index)
+            return way
+        way += step
+    return _FAR
+
+
+@inner
+def _extent(m, box, x, y, z):
+    """Half the length of a box along an axis of any length."""
+    total = 0.0
+    for k in range(3):
+        ax, ay, az = axis(m, box, k)
+        total += m[box + SIZE + k] * abs(ax * x + ay * y + az * z)
+    return total
+
+
+@inner
+def _cast_boxes(m, x, y, z, dx, dy, dz, reach, hit):
+    """By the fifteen axes: way to the first touch, or a far one."""
+    first = 0.0
+    last = reach
+    px = x - m[PLACED]
+    py = y - m[PLACED + 1]
+    pz = z - m[PLACED + 2]
+    for i in range(15):
+        if i < 6:
+            ax, ay, az = axis(m, 0 if i < 3 else PLACED, i % 3)
+        else:
+            ux, uy, uz = axis(m, 0, (i - 6) // 3)
+            vx, vy, vz = axis(m, PLACED, (i - 6) % 3)
+            ax = uy * vz - uz * vy
+            ay = uz * vx - ux * vz
+            az = ux * vy - uy * vx
+        if ax * ax + ay * ay + az * az > _PARALLEL:
+            apart = ax * px + ay * py + az * pz
+            speed = ax * dx + ay * dy + az * dz
+            half = _extent(m, 0, ax, ay, az) + _extent(m, PLACED, ax, ay, az)
+            if speed == 0.0:
+                if abs(apart) > half:
+                    return _FAR
+            else:
+                one = (-half - apart) / speed
+                two = (half - apart) / speed
+                first = max(first, min(one, two))
+                last = min(last, max(one, two))
+    if first > last:
+        return _FAR
+    m[0] = x + first * dx
+    m[1] = y + first * dy
+    m[2] = z + first * dz
+    margin = _MANIFOLD * (m[SIZE] + m[SIZE + 1] + m[SIZE + 2])
+    count = collide(m, BOX, 0, BOX, PLACED, _OUT, _WORK, margin if first > 0.0 else 0.0)
+    if count > 0:
+        # The middle of the points that touch.
+        best = 0
+        for i in range(1, count):
+            if m[_OUT + POINT * i + 3] < m[_OUT + POINT * best + 3]:
+                best = i
+        _write(m, hit, first, best)
+        if first > 0.0:
+            hit[1] = 0.0
+            for k in range(3):
+                total = 0.0
+                for i in range(count):
+                    total += m[_OUT + POINT * i + 4 + k]
+                hit[5 + k] = total / count
+    else:
+        # A corner's touch that rounding misses: between both centres.
+        hit[0] = first
+        hit[1] = 0.0
+        for k in range(3):
+            hit[2 + k] = m[k] - m[PLACED + k]
+            hit[5 + k] = 0.5 * (m[k] + m[PLACED + k])
+        size = sqrt(hit[2] * hit[2] + hit[3] * hit[3] + hit[4] * hit[4])
+        for k in range(3):
+            hit[2 + k] = hit[2 + k] / size if size > 0.0 else (1.0 if k == 1 else 0.0)
+    return first
+
+
+@inner
+def _cast_one(m, kind_a, kind_b, x, y, z, dx, dy, dz, reach, hit):
+    """Way of collider a, at entry 0 of m, to collider b behind it."""
+    if kind_a == BOX and kind_b == BOX:
+        return _cast_boxes(m, x, y, z, dx, dy, dz, reach, hit)
+    return _cast_convex(m, kind_a, kind_b, x, y, z, dx, dy, dz, reach, hit)
+
+
+@inner
+def half_extent(kind, placed, k):
+    """Half the length of a placed collider along an axis of the world."""
+    if kind == SPHERE:
+        return placed[SIZE]
+    if kind == CAPSULE:
+        return placed[SIZE] + placed[SIZE + 1] * abs(placed[3 + 3 * k + 1])
+    total = 0.0
+    for j in range(3):
+        total += placed[SIZE + j] * abs(placed[3 + 3 * k + j])
+    return total
+
+
+@inner
+def plant(kinds, placed, allowed, nodes, bounds, head):
+    """A tree of the allowed colliders of one world that have an end."""
+    n = kinds.shape[0]
+    clear_tree(nodes, head, n)
+    for i in range(n):
+        if allowed[i] and kinds[i] != HALF_SPACE:
+            for k in range(3):
+                half = half_extent(kinds[i], placed[i], k)
+                bounds[i, k] = placed[i, k] - half
+                bounds[i, 3 + k] = placed[i, k] + half
+            insert_leaf(nodes, bounds, head, n, i)
+
+
+@inner
+def _enters(bounds, node, ray, half, limit):
+    """Way at which a box, enlarged by half extents, is entered; above the limit where it is not."""
+    first = 0.0
+    last = limit
+    for k in range(3):
+        low = bounds[node, k] - half[k] - ray[k]
+        high = bounds[node, 3 + k] + half[k] - ray[k]
+        speed = ray[3 + k]
+        if speed == 0.0:
+            if low > 0.0 or high < 0.0:
+                return _FAR
+        else:
+            one = low / speed
+            two = high / speed
+            first = max(first, min(one, two))
+            last = min(last, max(one, two))
+    return first if first <= last else _FAR
+
+
+@kernel
+def cast_many(
+    kinds, placed, allowed, kind, query, direction, reach, every, found, hits,
+    memory, nodes, bounds, head, stack, ray,
+):  # fmt: skip
+    """Casts of many shapes in many worlds.
+
+    Args:
+        kinds: of the colliders, (n,) int64.
+        placed: colliders in the world, (worlds, n, PLACED).
+        allowed: which of them can be hit, (n,) bool.
+        kind: of what is cast.
+        query: placed at its start, (worlds, casts, PLACED).
+        direction: unit vectors, (worlds, casts, 3).
+        reach: longest way [m], (worlds, casts).
+        every: whether all hits are wanted, and not the first alone.
+        found: collider that is hit, or -1, (worlds, casts, n or 1) int64, written; with all hits in the colliders' order.
+        hits: of these, (worlds, casts, n or 1, HIT), written.
+        memory: (MEMORY,) to work in; the other arrays are for the tree, the nodes before a walk and the ray.
+    """
+    m = doubles_at(memory.ctypes.data)
+    n = kinds.shape[0]
+    tree = n >= MANY
+    half = ray[6:9]
+    hit = ray[9:]
+    for w in range(placed.shape[0]):
+        if tree:
+            plant(kinds, placed[w], allowed, nodes, bounds, head)
+        for c in range(query.shape[1]):
+            for k in range(3):
+                ray[k] = query[w, c, k]
+                ray[3 + k] = direction[w, c, k]
+                half[k] = half_extent(kind, query[w, c], k)
+            for k in range(PLACED):
+                m[k] = query[w, c, k]
+            best = reach[w, c]
+            waiting = 0
+            if tree and head[ROOT] >= 0:
+                stack[0] = head[ROOT]
+                waiting = 1
+            # What no tree holds comes first: its hits shorten the walk.
+            other = 0
+            while other < n or waiting > 0:
+                item = -1
+                if other < n:
+                    if allowed[other] and (not tree or kinds[other] == HALF_SPACE):
+                        item = other
+                    other += 1
+                else:
+                    waiting -= 1
+                    node = stack[waiting]
+                    if _enters(bounds, node, ray, half, best) <= best:
+                        if node < n:
+                            item = node
+                        else:
+                            left, right = children(nodes, node)
+                            near = _enters(bounds, left, ray, half, best)
+                            far = _enters(bounds, right, ray, half, best)
+                            if near > far:
+                                left, right = right, left
+                                near, far = far, near
+                            if far <= best:
+                                stack[waiting] = right
+                                waiting += 1
+                            if near <= best:
+                                stack[waiting] = left
+                                waiting += 1
+                if item >= 0:
+                    for k in range(PLACED):
+                        m[PLACED + k] = placed[w, item, k]
+                    way = _cast_one(
+                        m, kind, kinds[item], ray[0], ray[1], ray[2], ray[3], ray[4], ray[5], best, hit
+                    )
+                    if way <= best:
+                        slot = item if every else 0
+                        first = every or found[w, c, 0] < 0
+                        # Of what is hit at once the first collider counts, whatever the tree.
+                        if first or way < hits[w, c, 0, 0] or item < found[w, c, 0]:
+                            found[w, c, slot] = item
+                            for k in range(HIT):
+                                hits[w, c, slot, k] = hit[k]
+                        if not every:
+                            best = way
+
+
+@kernel
+def overlap_many(kinds, placed, allowed, kind, query, found, hits, memory, nodes, bounds, head, stack, box):
+    """Which colliders a shape overlaps, in many worlds; see ``cast_many``, whose hits these are with ways of 0."""
+    m = doubles_at(memory.ctypes.data)
+    n = kinds.shape[0]
+    tree = n >= MANY
+    for w in range(placed.shape[0]):
+        if tree:
+            plant(kinds, placed[w], allowed, nodes, bounds, head)
+        for c in range(query.shape[1]):
+            for k in range(PLACED):
+                m[k] = query[w, c, k]
+            for k in range(3):
+                half = half_extent(kind, query[w, c], k)
+                box[k] = query[w, c, k] - half
+                box[3 + k] = query[w, c, k] + half
+            waiting = 0
+            if tree and head[ROOT] >= 0:
+                stack[0] = head[ROOT]
+                waiting = 1
+            other = 0
+            while other < n or waiting > 0:
+                item = -1
+                if other < n:
+                    if allowed[other] and (not tree or kinds[other] == HALF_SPACE):
+                        item = other
+                    other += 1
+                else:
+                    waiting -= 1
+                    node = stack[waiting]
+                    outside = False
+                    for k in range(3):
+                        outside = outside or bounds[node, k] > box[3 + k] or bounds[node, 3 + k] < box[k]
+                    if not outside:
+                        if node < n:
+                            item = node
+                        else:
+                            left, right = children(nodes, node)
+                            stack[waiting] = left
+                            stack[waiting + 1] = right
+                            waiting += 2
+                if item >= 0:
+                    for k in range(PLACED):
+                        m[PLACED + k] = placed[w, item, k]
+                    index = _nearest(m, kind, kinds[item], 0.0)
+                    if index >= 0:
+                        found[w, c, item] = item
+                        _write(m, hits[w, c, item], 0.0, index)
+
+
+__all__ = ["HEAD", "HIT", "MANY", "MEMORY", "STACK", "cast_many", "overlap_many"]

@@ -1,0 +1,264 @@
+"""Proximal passes of every island of one world, and a soft one where they do not settle."""
+
+from __future__ import annotations
+
+from math import sqrt
+
+from ..constraints.contact_rows import accelerate, add_impulse, length, relative_velocity
+from ..constraints.joint_rows import add_row_impulse, joint_at, joint_solids, row_at
+from ..constraints.solids import solid_at, symmetric_times
+from ..kernel import inner
+from ..math.pointers import LANES, doubles_at
+from ..model.rigid_layout import (
+    C_BEFORE,
+    C_COMPLIANCE,
+    C_FRICTION,
+    C_IMPULSE,
+    C_SHIFT,
+    C_SPEED,
+    C_WEIGHT,
+    END_A,
+    END_B,
+    HELD,
+    J_BEFORE,
+    J_COMPLIANCE,
+    J_IMPULSE,
+    J_KIND,
+    J_OFFSET,
+    JOINTS,
+    LIST,
+    LOCAL,
+    N_COMPLIANCE,
+    N_IMPULSE,
+    N_ITERATIONS,
+    N_PASSES,
+    N_SHIFT,
+    N_TOLERANCE,
+    NUMBERS,
+    OFF,
+    ORDER,
+    ROW_ENTRIES,
+    S_FREE,
+    S_GEOMETRIC,
+    S_MOVES,
+    S_PUSH,
+    S_TURNS,
+    S_VELOCITY,
+    SOLIDS,
+    SPRING,
+)
+from ..model.tape import H_UNSETTLED
+from .block_cholesky import SIX
+from .islands import gather_island, join
+from .rigid_newton import contact_at, contact_ends, is_free, minimise
+
+# Compliance of the fallback, which is solved once, and of the push, over the mobility of a contact.
+_SOFT, _PUSH = 1e-4, 1e-3
+# Compliance, residual, passes and steps of what takes rounding out of the impulses in the end.
+_POLISH, _POLISHED, _POLISHES, _POLISH_STEPS = 1e-3, 1e-12, 2, 3
+# Solids of an island in which it is worth that.
+_FEW = 2
+
+
+@inner
+def _begin_velocity(tape, s, n, rigid, size, contacts, joints, warm):
+    """Velocities that the impulses of the last pass make, or without any."""
+    for i in range(size):
+        at = solid_at(tape, rigid, n[tape[rigid + ORDER] + i])
+        for k in range(SIX):
+            s[at + S_PUSH + k] = 0.0
+            s[at + S_VELOCITY + k] = s[at + S_FREE + k]
+    if warm:
+        for j in range(contacts):
+            i = n[tape[rigid + LIST] + j]
+            c = contact_at(tape, rigid, i)
+            a, b = contact_ends(tape, n, rigid, i)
+            add_impulse(
+                s, c, a, b, S_PUSH, s[c + C_BEFORE], s[c + C_BEFORE + 1], s[c + C_BEFORE + 2]
+            )
+        for j in range(joints):
+            joint = joint_at(tape, rigid, n[tape[rigid + HELD] + j])
+            a, b = joint_solids(tape, rigid, joint)
+            row = row_at(tape, rigid, tape[joint + 4])
+            for _ in range(tape[joint + 5]):
+                if s[row + J_KIND] != OFF:
+                    add_row_impulse(s, row, a, b, S_PUSH, s[row + J_BEFORE] - s[row + J_OFFSET])
+                row += ROW_ENTRIES
+        for i in range(size):
+            accelerate(s, solid_at(tape, rigid, n[tape[rigid + ORDER] + i]), S_PUSH, S_VELOCITY)
+
+
+@inner
+def _polish(tape, s, n, rigid, size, contacts, joints, rows):
+    """Take rounding out of the impulses.
+
+    That of velocities counts in them by one over the compliance: less with a larger one, which passes take out again.
+    """
+    for j in range(contacts):
+        c = contact_at(tape, rigid, n[tape[rigid + LIST] + j])
+        s[c + C_COMPLIANCE] = _POLISH * s[c + C_WEIGHT]
+    for _ in range(_POLISHES):
+        taken = minimise(tape, s, n, rigid, size, contacts, joints, rows, _POLISHED, _POLISH_STEPS)
+        for j in range(contacts):
+            c = contact_at(tape, rigid, n[tape[rigid + LIST] + j])
+            for k in range(3):
+                if taken < 0:
+                    s[c + C_IMPULSE + k] = s[c + C_BEFORE + k]
+                else:
+                    s[c + C_BEFORE + k] = s[c + C_IMPULSE + k]
+        if taken <= 0:
+            break
+
+
+@inner
+def _solve_island(tape, s, n, rigid, size, contacts, joints, rows):
+    """All passes of an island; whether they settled."""
+    numbers = doubles_at(tape[rigid + NUMBERS])
+    tolerance = numbers[N_TOLERANCE]
+    iterations = int(numbers[N_ITERATIONS])
+    _begin_velocity(tape, s, n, rigid, size, contacts, joints, True)
+    for j in range(contacts):
+        i = n[tape[rigid + LIST] + j]
+        c = contact_at(tape, rigid, i)
+        a, b = contact_ends(tape, n, rigid, i)
+        s[c + C_COMPLIANCE] = numbers[N_COMPLIANCE] * s[c + C_WEIGHT]
+        _, u1, u2 = relative_velocity(s, c, a, b, S_VELOCITY)
+        s[c + C_SHIFT] = sqrt(u1 * u1 + u2 * u2)
+    moved = False
+    settled = False
+    for _ in range(int(numbers[N_PASSES])):
+        taken = minimise(tape, s, n, rigid, size, contacts, joints, rows, tolerance, iterations)
+        if taken < 0:
+            return False
+        moved = moved or taken > 0
+        change = 0.0
+        shift = 0.0
+        for j in range(contacts):
+            c = contact_at(tape, rigid, n[tape[rigid + LIST] + j])
+            left = s[c + C_COMPLIANCE] * length(
+                s[c + C_IMPULSE] - s[c + C_BEFORE],
+                s[c + C_IMPULSE + 1] - s[c + C_BEFORE + 1],
+                s[c + C_IMPULSE + 2] - s[c + C_BEFORE + 2],
+            )
+            change = max(change, left)
+            u1 = s[c + C_SPEED + 1]
+            u2 = s[c + C_SPEED + 2]
+            slip = sqrt(u1 * u1 + u2 * u2)
+            if s[c + C_IMPULSE] > 0.0:
+                shift = max(shift, s[c + C_FRICTION] * abs(slip - s[c + C_SHIFT]))
+            s[c + C_SHIFT] = slip
+            for k in range(3):
+                s[c + C_BEFORE + k] = s[c + C_IMPULSE + k]
+        for j in range(joints):
+            joint = joint_at(tape, rigid, n[tape[rigid + HELD] + j])
+            row = row_at(tape, rigid, tape[joint + 4])
+            for _ in range(tape[joint + 5]):
+                if s[row + J_KIND] != OFF and s[row + J_KIND] != SPRING:
+                    value = s[row + J_OFFSET] + s[row + J_IMPULSE]
+                    change = max(change, s[row + J_COMPLIANCE] * abs(value - s[row + J_BEFORE]))
+                    s[row + J_BEFORE] = value
+                row += ROW_ENTRIES
+        settled = change <= numbers[N_IMPULSE] and shift <= numbers[N_SHIFT]
+        if settled:
+            break
+    if moved and settled and size <= _FEW and joints == 0:
+        _polish(tape, s, n, rigid, size, contacts, joints, rows)
+    return True
+
+
+@inner
+def _solve_softly(tape, s, n, rigid, size, contacts, joints, rows, compliance):
+    """One pass with softer contacts from nothing; whether it settled."""
+    numbers = doubles_at(tape[rigid + NUMBERS])
+    for j in range(contacts):
+        c = contact_at(tape, rigid, n[tape[rigid + LIST] + j])
+        s[c + C_COMPLIANCE] = compliance * s[c + C_WEIGHT]
+        s[c + C_SHIFT] = 0.0
+        for k in range(3):
+            s[c + C_BEFORE + k] = 0.0
+    for j in range(joints):
+        joint = joint_at(tape, rigid, n[tape[rigid + HELD] + j])
+        row = row_at(tape, rigid, tape[joint + 4])
+        for _ in range(tape[joint + 5]):
+            s[row + J_BEFORE] = s[row + J_OFFSET]
+            row += ROW_ENTRIES
+    _begin_velocity(tape, s, n, rigid, size, contacts, joints, False)
+    few = int(numbers[N_ITERATIONS])
+    loose = 10.0 * numbers[N_TOLERANCE]
+    taken = minimise(tape, s, n, rigid, size, contacts, joints, rows, loose, 2 * few)
+    return taken >= 0
+
+
+@inner
+def _keep_impulses(tape, s, n, rigid, size, contacts):
+    """S_VELOCITY = sum of the impulses on every solid of an island: equal and opposite to the bit."""
+    for i in range(size):
+        at = solid_at(tape, rigid, n[tape[rigid + ORDER] + i])
+        # Where geometric stiffness was counted: what it did to the torques.
+        x, y, z = symmetric_times(
+            s,
+            at + S_GEOMETRIC,
+            s[at + S_VELOCITY + 3],
+            s[at + S_VELOCITY + 4],
+            s[at + S_VELOCITY + 5],
+        )
+        for k in range(3):
+            s[at + S_VELOCITY + k] = 0.0
+        s[at + S_VELOCITY + 3] = -x
+        s[at + S_VELOCITY + 4] = -y
+        s[at + S_VELOCITY + 5] = -z
+    for j in range(contacts):
+        i = n[tape[rigid + LIST] + j]
+        c = contact_at(tape, rigid, i)
+        a, b = contact_ends(tape, n, rigid, i)
+        add_impulse(
+            s, c, a, b, S_VELOCITY, s[c + C_IMPULSE], s[c + C_IMPULSE + 1], s[c + C_IMPULSE + 2]
+        )
+
+
+@inner
+def _keep_joint_impulses(tape, s, n, rigid, joints):
+    """Add those of an island's joints."""
+    for j in range(joints):
+        joint = joint_at(tape, rigid, n[tape[rigid + HELD] + j])
+        a, b = joint_solids(tape, rigid, joint)
+        row = row_at(tape, rigid, tape[joint + 4])
+        for _ in range(tape[joint + 5]):
+            if s[row + J_KIND] != OFF:
+                add_row_impulse(s, row, a, b, S_VELOCITY, s[row + J_IMPULSE])
+            row += ROW_ENTRIES
+
+
+@inner
+def solve_islands(tape, s, n, rigid, count, k, push):
+    """Solve all islands of lane k; solids end with the impulses on them in S_VELOCITY, or pushed with velocities."""
+    for j in range(tape[rigid + JOINTS]):
+        joint = joint_at(tape, rigid, j)
+        a, b = joint_solids(tape, rigid, joint)
+        one = tape[joint + 1] if is_free(s, a) else -1
+        other = tape[joint + 2] if is_free(s, b) else -1
+        # The first end of a bond can move.
+        n[tape[rigid + END_A] + count + j] = one if one >= 0 else other
+        n[tape[rigid + END_B] + count + j] = other if one >= 0 else -1
+    join(tape, n, rigid, count + tape[rigid + JOINTS])
+    for seed in range(tape[rigid + SOLIDS]):
+        at = solid_at(tape, rigid, seed)
+        local = n[tape[rigid + LOCAL] + seed]
+        fixed = s[at + S_MOVES] == 0.0 and s[at + S_TURNS] == 0.0
+        if fixed:
+            for c in range(SIX):
+                s[at + S_VELOCITY + c] = 0.0
+        elif local < 0:
+            size, contacts, joints, rows = gather_island(tape, n, rigid, seed, count)
+            good = True
+            if push:
+                good = _solve_softly(tape, s, n, rigid, size, contacts, joints, rows, _PUSH)
+            elif contacts + joints > 0:
+                good = _solve_island(tape, s, n, rigid, size, contacts, joints, rows)
+                if not good:
+                    good = _solve_softly(tape, s, n, rigid, size, contacts, joints, rows, _SOFT)
+            if not good:
+                s[LANES * tape[H_UNSETTLED] + k] = 1.0
+            if not push:
+                _keep_impulses(tape, s, n, rigid, size, contacts)
+                _keep_joint_impulses(tape, s, n, rigid, joints)
