@@ -56,6 +56,7 @@ from .scene.particle import Particle
 from .scene.rider import Rider
 from .scene.scene import Scene
 from .scene.shapes import Box, Capsule, Hollow, Part, Sphere
+from .scene.triggers import Trigger
 from .solvers.direct import Direct
 from .solvers.gauss_seidel import GaussSeidel
 from .solvers.proximal_newton import ProximalNewton
@@ -123,6 +124,7 @@ __all__ = [
     "StiffSpring",
     "SymplecticEuler",
     "Thruster",
+    "Trigger",
     "UserForce",
     "WheelJoint",
     "World",

@@ -26,6 +26,7 @@ from .scene.contacts import ContactGenerator
 from .scene.forces import UserForce
 from .scene.particle import Particle
 from .scene.scene import Scene
+from .scene.triggers import Trigger
 from .state import (
     Bodies,
     Handle,
@@ -39,6 +40,7 @@ from .state import (
     strike,
 )
 from .stepping import WHOLE_STEP, advance_blocks, launch, start_again
+from .triggers import Events, events_of, watch
 from .written import evaluate_forces, generate_contacts
 
 
@@ -141,7 +143,7 @@ class World:
         if self._stale:
             self._prepare()
         steps *= self.method.substeps
-        if self._split:
+        if self._split or self.scene.of(Trigger):
             for _ in range(steps):
                 self._step_split()
         else:
@@ -166,7 +168,7 @@ class World:
         advance_blocks(self._launch[thread], first, last, steps, phase)
 
     def _step_split(self) -> None:
-        """One step in parts, with user-written forces and contacts evaluated in between."""
+        """One step in parts, user-written forces and contacts evaluated in between; then triggers look."""
         generate_contacts(self)
         written = self.scene.of(UserForce)
         shares = self.method.integrator.evaluations if written else (None,)
@@ -174,6 +176,7 @@ class World:
             if share is not None:
                 evaluate_forces(self, share * self.method.substep)
             self._run(1, 1 << part if part < len(shares) - 1 else WHOLE_STEP << part)
+        watch(self)
 
     # Access
 
@@ -310,11 +313,11 @@ class World:
         It holds addresses of this world's arrays: ask for it at every call.
 
         Raises:
-            ValueError: the scene has user-written forces or contacts, which only ``step`` can call.
+            ValueError: the scene has user-written forces or contacts, or triggers, which only ``step`` can call.
         """
-        if self._split:
+        if self._split or self.scene.of(Trigger):
             raise ValueError(
-                "World.launch: the scene has user-written forces or contacts; use World.step."
+                "World.launch: the scene has user-written forces or contacts, or triggers; use World.step."
             )
         if self._stale:
             self._prepare()
@@ -376,6 +379,14 @@ class World:
     def joints(self) -> Joints:
         """What joints bear after the last step, how far they are open, and where what they leave free stands."""
         return joints_of(self)
+
+    def events(self, trigger: Trigger) -> Events:
+        """What a trigger of the scene saw in the last step, and how often things came and went.
+
+        Raises:
+            KeyError: it is not in the scene.
+        """
+        return events_of(self, trigger)
 
     @property
     def queries(self) -> Queries:

@@ -11,7 +11,7 @@ import numpy as np
 from ..model.colliders import CENTRE, PLACED, SIZE, SPHERE, TURN, kind_and_size
 from ..scene import checks
 from ..scene.shapes import Box, Capsule, Hollow, Shape, Sphere, rotation_matrix
-from .casts import HEAD, HIT, MEMORY, STACK, cast_many, overlap_many
+from .casts import HEAD, HIT, MANY, MEMORY, STACK, cast_many, overlap_many
 from .placed import colliders_in, placed_colliders
 
 if TYPE_CHECKING:
@@ -82,7 +82,9 @@ class Queries:
         Raises:
             ValueError: not finite, of another shape, or without a direction.
         """
-        return self._cast(SPHERE, (0.0, 0.0, 0.0), start, direction, _UPRIGHT, reach, every, only, ignore)
+        return self._cast(
+            SPHERE, (0.0, 0.0, 0.0), start, direction, _UPRIGHT, reach, every, only, ignore
+        )
 
     def segment(
         self, start: Any, end: Any, *, every: bool = False,
@@ -121,7 +123,9 @@ class Queries:
         query = self._query(kind, size, place, orientation)
         return self._sorted(query, None, kind, np.zeros(query.shape[:2]), True, only, ignore)
 
-    def sees(self, start: Any, end: Any, *, only: Iterable[Any] | None = None, ignore: Iterable[Any] = ()) -> np.ndarray:
+    def sees(
+        self, start: Any, end: Any, *, only: Iterable[Any] | None = None, ignore: Iterable[Any] = ()
+    ) -> np.ndarray:
         """Whether nothing lies between places, (worlds, questions) bool: the line of sight."""
         return ~self.segment(start, end, only=only, ignore=ignore).hit
 
@@ -141,20 +145,26 @@ class Queries:
         good = given is not None and 1 <= given.ndim <= 3 and given.shape[-1] == width
         if given is None or not good or (given.ndim == 3 and given.shape[0] not in (1, worlds)):
             raise ValueError(
-                f"World.queries: {name} is {checks.described(value)}; it must be of shape ({width},), (questions, {width}) "
-                f"or ({worlds}, questions, {width}). Give one vector for each question."
+                f"World.queries: {name} is {checks.described(value)}; it must be of shape ({width},), "
+                f"(questions, {width}) or ({worlds}, questions, {width}). Give one vector for each question."
             )
         if not np.isfinite(given).all():
-            raise ValueError(f"World.queries: {name} is not finite in every place; it must be. Give metres.")
+            raise ValueError(
+                f"World.queries: {name} is not finite in every place; it must be. Give metres."
+            )
         return given.reshape((1,) * (3 - given.ndim) + given.shape)
 
-    def _query(self, kind: int, size: tuple[float, float, float], place: Any, orientation: Any) -> np.ndarray:
+    def _query(
+        self, kind: int, size: tuple[float, float, float], place: Any, orientation: Any
+    ) -> np.ndarray:
         """The shape placed for every question."""
         centre = self._points("start", place)
         turn = self._points("orientation", orientation, 4)
         length = np.linalg.norm(turn, axis=-1, keepdims=True)
         if not (length > 0.0).all():
-            raise ValueError("World.queries: orientation is 0; it must be a quaternion. Use (1, 0, 0, 0).")
+            raise ValueError(
+                "World.queries: orientation is 0; it must be a quaternion. Use (1, 0, 0, 0)."
+            )
         turn = rotation_matrix(turn / length)
         shape = np.broadcast_shapes(centre.shape[:2], turn.shape[:2], (self._world.worlds, 1))
         query = np.zeros((*shape, PLACED))
@@ -171,10 +181,14 @@ class Queries:
         way = self._points("direction", direction)
         length = np.linalg.norm(way, axis=-1, keepdims=True)
         if not (length > 0.0).all():
-            raise ValueError("World.queries: direction is 0; it must point somewhere. Give any other vector.")
+            raise ValueError(
+                "World.queries: direction is 0; it must point somewhere. Give any other vector."
+            )
         far = checks.floats(reach)
         if far is None or not (far > 0.0).all():
-            raise ValueError(f"World.queries: reach is {reach!r}; it must be greater than 0. Leave it out for inf.")
+            raise ValueError(
+                f"World.queries: reach is {reach!r}; it must be greater than 0. Leave it out for inf."
+            )
         shape = np.broadcast_shapes(query.shape[:2], way.shape[:2], far.shape)
         query = np.ascontiguousarray(np.broadcast_to(query, (*shape, PLACED)))
         way = np.ascontiguousarray(np.broadcast_to(way / length, (*shape, 3)))
@@ -183,7 +197,14 @@ class Queries:
         return self._sorted(query, way, kind, far, every, only, ignore)
 
     def _sorted(
-        self, query: np.ndarray, way: np.ndarray | None, kind: int, reach: np.ndarray, every: bool, only: Any, ignore: Any
+        self,
+        query: np.ndarray,
+        way: np.ndarray | None,
+        kind: int,
+        reach: np.ndarray,
+        every: bool,
+        only: Any,
+        ignore: Any,
     ) -> Hits:
         """Ask, and put hits in order; ``way`` None asks for overlaps."""
         colliders = colliders_in(self._world)
@@ -198,9 +219,24 @@ class Queries:
         )  # fmt: skip
         placed = placed_colliders(self._world)
         if way is None:
-            overlap_many(colliders.kind, placed, allowed, kind, query, found, hits, *work)
+            overlap_many(
+                colliders.kind, placed, allowed, kind, query, n >= MANY, found, hits, *work
+            )
         else:
-            cast_many(colliders.kind, placed, allowed, kind, query, way, reach, every, found, hits, *work)
+            cast_many(
+                colliders.kind,
+                placed,
+                allowed,
+                kind,
+                query,
+                way,
+                reach,
+                every,
+                n >= MANY,
+                found,
+                hits,
+                *work,
+            )
         distance = np.where(found >= 0, hits[..., 0], np.inf)
         if every:
             # By distance, then by depth, then as the scene has them.
@@ -229,7 +265,8 @@ class Queries:
             for thing in things:
                 if id(thing) not in known:
                     raise KeyError(
-                        f"World.queries: {name} has a {type(thing).__name__} without a shape in the world's scene; add it."
+                        f"World.queries: {name} has a {type(thing).__name__} without a shape in the "
+                        "world's scene; add it."
                     )
         wanted = known if only is None else {id(thing) for thing in only}
         wanted -= {id(thing) for thing in ignore}
@@ -245,6 +282,3 @@ def _owners(owners: tuple[Any, ...]) -> tuple[tuple[Any, ...], np.ndarray]:
             place[id(owner)] = len(things)
             things.append(owner)
     return tuple(things), np.array([place[id(owner)] for owner in owners], dtype=np.int64)
-
-
-

@@ -28,8 +28,8 @@ _OUT = 2 * PLACED
 _WORK = _OUT + ALL_POINTS * POINT
 #: Numbers to work in.
 MEMORY = _WORK + WORK
-#: Colliders from which on a tree is made.
-MANY = 16
+#: Colliders from which on a tree is made (below, planting it takes what it saves).
+MANY = 4
 # Numbers of a hit: way, gap, normal, place.
 HIT = 8
 
@@ -217,7 +217,7 @@ def _enters(bounds, node, ray, half, limit):
 
 @kernel
 def cast_many(
-    kinds, placed, allowed, kind, query, direction, reach, every, found, hits,
+    kinds, placed, allowed, kind, query, direction, reach, every, tree, found, hits,
     memory, nodes, bounds, head, stack, ray,
 ):  # fmt: skip
     """Casts of many shapes in many worlds.
@@ -231,13 +231,13 @@ def cast_many(
         direction: unit vectors, (worlds, casts, 3).
         reach: longest way [m], (worlds, casts).
         every: whether all hits are wanted, and not the first alone.
-        found: collider that is hit, or -1, (worlds, casts, n or 1) int64, written; with all hits in the colliders' order.
+        tree: whether to plant one, or to try all colliders.
+        found: collider that is hit, or -1, (worlds, casts, n or 1) int64, written; all hits in the colliders' order.
         hits: of these, (worlds, casts, n or 1, HIT), written.
         memory: (MEMORY,) to work in; the other arrays are for the tree, the nodes before a walk and the ray.
     """
     m = doubles_at(memory.ctypes.data)
     n = kinds.shape[0]
-    tree = n >= MANY
     half = ray[6:9]
     hit = ray[9:]
     for w in range(placed.shape[0]):
@@ -286,7 +286,17 @@ def cast_many(
                     for k in range(PLACED):
                         m[PLACED + k] = placed[w, item, k]
                     way = _cast_one(
-                        m, kind, kinds[item], ray[0], ray[1], ray[2], ray[3], ray[4], ray[5], best, hit
+                        m,
+                        kind,
+                        kinds[item],
+                        ray[0],
+                        ray[1],
+                        ray[2],
+                        ray[3],
+                        ray[4],
+                        ray[5],
+                        best,
+                        hit,
                     )
                     if way <= best:
                         slot = item if every else 0
@@ -301,11 +311,12 @@ def cast_many(
 
 
 @kernel
-def overlap_many(kinds, placed, allowed, kind, query, found, hits, memory, nodes, bounds, head, stack, box):
+def overlap_many(
+    kinds, placed, allowed, kind, query, tree, found, hits, memory, nodes, bounds, head, stack, box
+):
     """Which colliders a shape overlaps, in many worlds; see ``cast_many``, whose hits these are with ways of 0."""
     m = doubles_at(memory.ctypes.data)
     n = kinds.shape[0]
-    tree = n >= MANY
     for w in range(placed.shape[0]):
         if tree:
             plant(kinds, placed[w], allowed, nodes, bounds, head)
@@ -332,7 +343,9 @@ def overlap_many(kinds, placed, allowed, kind, query, found, hits, memory, nodes
                     node = stack[waiting]
                     outside = False
                     for k in range(3):
-                        outside = outside or bounds[node, k] > box[3 + k] or bounds[node, 3 + k] < box[k]
+                        outside = (
+                            outside or bounds[node, k] > box[3 + k] or bounds[node, 3 + k] < box[k]
+                        )
                     if not outside:
                         if node < n:
                             item = node

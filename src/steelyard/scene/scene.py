@@ -34,6 +34,7 @@ from .joints import JOINTS
 from .links import Cable, CableConstraint, Rod, RodConstraint
 from .particle import Particle
 from .rider import Rider
+from .triggers import Trigger
 
 LINKS = (Rod, RodConstraint, Cable, CableConstraint)
 CONTACTS = (Ground, LinePlatform, Collisions, ContactGenerator)
@@ -50,20 +51,21 @@ FORCES = (
     Explosion,
     UserForce,
 )
-KINDS = (Particle, Body, Rider, *LINKS, *JOINTS, *CONTACTS, *FORCES, *BODY_FORCES)
+KINDS = (Particle, Body, Rider, *LINKS, *JOINTS, *CONTACTS, *FORCES, *BODY_FORCES, Trigger)
 
 Thing = TypeVar("Thing")
 
 
 def members(thing: Any) -> Iterator[Particle | Body]:
-    """The particles and bodies that a link, rider, contact generator or force refers to."""
+    """The particles and bodies that a link, joint, rider, contact generator, force or trigger refers to."""
     if isinstance(thing, JOINTS):
         yield from thing.members()
         return
     for name in ("a", "b", "particle", "point", "body"):
         if hasattr(thing, name):
             end = getattr(thing, name)
-            yield end.body if isinstance(end, BodyPoint) else end
+            if end is not None:
+                yield end.body if isinstance(end, BodyPoint) else end
     yield from getattr(thing, "particles", None) or ()
     yield from getattr(thing, "deck", ())
     for pair in getattr(thing, "pairs", ()):

@@ -211,6 +211,20 @@ def rotation_matrix(quaternion: np.ndarray) -> np.ndarray:
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
+def quaternion_times(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """The turn b and then a, quaternions (..., 4)."""
+    (aw, ax, ay, az), (bw, bx, by, bz) = np.moveaxis(a, -1, 0), np.moveaxis(b, -1, 0)
+    return np.stack(
+        [
+            aw * bw - ax * bx - ay * by - az * bz,
+            aw * bx + ax * bw + ay * bz - az * by,
+            aw * by + ay * bw + az * bx - ax * bz,
+            aw * bz + az * bw + ax * by - ay * bx,
+        ],
+        axis=-1,
+    )
+
+
 def steiner(mass: float, arm: np.ndarray) -> np.ndarray:
     """What a mass [kg] at ``arm`` (3,) [m] adds to an inertia, m (d.d - d d^T): the theorem of parallel axes."""
     return np.asarray(mass * (arm @ arm * np.eye(3) - np.outer(arm, arm)))
