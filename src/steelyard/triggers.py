@@ -62,7 +62,7 @@ def watch(world: World) -> None:
         things = trigger.watched(world.scene)
         if not things:
             continue
-        place, turn = _pose(world, trigger)
+        place, turn = pose_of(world, trigger)
         hits = world.queries.overlap(trigger.shape, place, orientation=turn, only=things)
         now = _inside(hits, things)
         inside, before = world._view(trigger, "inside"), world._view(trigger, "before")
@@ -72,8 +72,8 @@ def watch(world: World) -> None:
         world._view(trigger, "exits")[:] += ~now & (before > 0.0)
 
 
-def _pose(world: World, trigger: Trigger) -> tuple[np.ndarray, np.ndarray]:
-    """Place (worlds, 1, 3) and orientation (worlds, 1, 4)."""
+def pose_of(world: World, trigger: Trigger) -> tuple[np.ndarray, np.ndarray]:
+    """Place and orientation, (3,) and (4,), or (worlds, 1, 3) and (worlds, 1, 4) where a body carries it."""
     place, turn = np.array(trigger.place), np.array(trigger.orientation)
     if trigger.body is None:
         return place, turn

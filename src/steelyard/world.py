@@ -13,6 +13,7 @@ from .diagnostics.contacts import Contacts, contacts_of
 from .diagnostics.energy import world_energy
 from .diagnostics.health import health_flags
 from .diagnostics.joints import Joints, joints_of
+from .diagnostics.penetration import penetration_of
 from .diagnostics.residual import link_residuals
 from .math.pointers import LANES
 from .methods import Method, default_for
@@ -374,6 +375,11 @@ class World:
             ValueError: this world's method keeps no list of contacts.
         """
         return contacts_of(self)
+
+    @property
+    def penetration(self) -> np.ndarray:
+        """Depth of the deepest overlap of bodies with each other or the ground [m], 0 without any, (worlds,)."""
+        return penetration_of(self)
 
     @property
     def joints(self) -> Joints:

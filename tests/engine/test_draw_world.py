@@ -5,6 +5,7 @@ import pytest
 
 import steelyard as sy
 from steelyard.draw import palette
+from steelyard.scene.shapes import rotation_matrix
 
 
 def one_of_each() -> sy.Scene:
@@ -100,3 +101,29 @@ def test_bodies_are_drawn_as_they_lie() -> None:
     assert any(line.width == 0.2 and line.color == palette.EARTH for line in drawing.lines)
     axes = [line for line in drawing.lines if line.start == (0.0, 4.0, 0.0)]
     assert len(axes) == 3
+
+
+def test_joints_contacts_of_bodies_and_triggers_are_drawn() -> None:
+    scene = sy.Scene()
+    box = scene.add(sy.Body(position=(0, 0.5, 0), parts=sy.Box((0.5, 0.5, 0.5))))
+    arm = scene.add(sy.Body(position=(0.9, 1.2, 0), parts=sy.Capsule(0.1, 0.3)))
+    hinge = scene.add(sy.HingeJoint(a=arm, b=box, place=(0.5, 1.2, 0)))
+    scene.add(sy.Ground())
+    scene.add(sy.Trigger(sy.Sphere(0.4), place=(2, 1, 0)))
+    world = sy.World(scene, worlds=2)
+    world.step(30)
+    drawing = sy.draw.draw_world(world, 1)
+    volumes = [c for c in drawing.circles if len(c.color) == 4]
+    assert len([c for c in volumes if c.centre == (2.0, 1.0, 0.0)]) >= 1
+    marks = [line for line in drawing.lines if line.color == palette.LOAD]
+    assert len(marks) == 1
+    place = world.bodies.position[1, 0] + rotation_matrix(world.bodies.orientation[1, 0]) @ (
+        0.5,
+        0.7,
+        0,
+    )
+    np.testing.assert_allclose(np.mean([marks[0].start, marks[0].end], axis=0), place, atol=1e-6)
+    rings = [c for c in drawing.circles if c.color == palette.CONTACT]
+    assert len(rings) == int((np.linalg.norm(world.contacts.force[1], axis=1) > 0).sum()) >= 3
+    world[hinge].broken = 1.0
+    assert palette.LOAD not in [line.color for line in sy.draw.draw_world(world, 1).lines]

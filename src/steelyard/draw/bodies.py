@@ -42,7 +42,19 @@ def draw_body(
 
 
 def _draw_part(drawing: Drawing, part: Part, centre: Vector, turn: Vector, color: Color) -> None:
-    shape = part.shape.outer if isinstance(part.shape, Hollow) else part.shape
+    draw_shape(
+        drawing,
+        part.shape.outer if isinstance(part.shape, Hollow) else part.shape,
+        centre,
+        turn,
+        color,
+    )
+
+
+def draw_shape(
+    drawing: Drawing, shape: Sphere | Box | Capsule, centre: Vector, turn: Vector, color: Color
+) -> None:
+    """Add a ball, box or capsule with its centre [m] and rotation (3, 3)."""
     if isinstance(shape, Sphere):
         drawing.circle(centre, shape.radius, color=color)
         # Two great circles: a ball alone does not show that it turns.

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..diagnostics.spans import place_of
+from ..model.parameters import RIGID
+from ..scene.body import Body
 from ..scene.contacts import Collisions, ContactGenerator, Ground, LinePlatform
 from ..scene.forces import (
     AnchoredBungee,
@@ -16,11 +18,15 @@ from ..scene.forces import (
     StiffSpring,
     UserForce,
 )
+from ..scene.joints import JOINTS, DistanceJoint
 from ..scene.links import Cable, CableConstraint, Rod, RodConstraint
 from ..scene.rider import Rider
 from ..scene.scene import SPRINGS
+from ..scene.shapes import rotation_matrix
+from ..scene.triggers import Trigger
+from ..triggers import pose_of
 from . import palette
-from .bodies import draw_body
+from .bodies import draw_body, draw_shape
 from .primitives import Color, Drawing
 
 if TYPE_CHECKING:
@@ -34,6 +40,8 @@ _TURNS = 7
 # A contact is drawn from this share of the extent on, a cable as taut from this share of its length on.
 _NEAR, _TAUT = 1e-3, 1e-3
 _SLACK = 110
+#: Opacity of a trigger's volume.
+_VOLUME = 60
 
 
 def draw_world(world: World, index: int = 0, *, forces: bool = False) -> Drawing:
@@ -42,7 +50,7 @@ def draw_world(world: World, index: int = 0, *, forces: bool = False) -> Drawing
     Particles are balls of their radius (a small one if they have none), loads of riders orange, immovable ones dark.
     Bodies are their parts, blue-green, immovable ones grey; those without parts are three axes. Rods are struts; cables
     ropes, pale while slack; springs coils, red in tension and blue in compression, pale while a bungee is slack.
-    Touching contacts are rings with their normals.
+    Touching contacts are rings with their normals, joints orange marks with their axes, triggers pale volumes.
 
     Args:
         world: the worlds.
@@ -94,8 +102,25 @@ class _WorldDrawing:
             place = self.world.bodies.position[self.index, k]
             turn = self.world.bodies.orientation[self.index, k]
             draw_body(self.drawing, body, place, turn, axes=0.3 * self.extent)
-        for generator in scene.of(Ground, LinePlatform, Collisions, ContactGenerator):
-            self._contacts(generator)
+        for joint in scene.of(*JOINTS):
+            self._joint(joint)
+        if (RIGID, "contacts") in self.world.model.places:
+            self._body_contacts()
+        else:
+            for generator in scene.of(Ground, LinePlatform, Collisions, ContactGenerator):
+                self._contacts(generator)
+        for trigger in scene.of(Trigger):
+            place, turn = (
+                value.reshape(-1, value.shape[-1]) for value in pose_of(self.world, trigger)
+            )
+            which = self.index if len(place) > 1 else 0
+            draw_shape(
+                self.drawing,
+                trigger.shape,
+                place[which],
+                rotation_matrix(turn[which]),
+                (*palette.WIND, _VOLUME),
+            )
         if forces:
             self._forces()
         return self.drawing
@@ -191,6 +216,37 @@ class _WorldDrawing:
         y, size = float(self._value(float_, "surface")), 0.5 * self.extent
         corners = [(x + a * size, y, z + b * size) for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
         self.drawing.face(corners, color=(*palette.WIND, 70))
+
+    def _joint(self, joint: Any) -> None:
+        """A mark where both sides meet, with the axis about or along which they move; none where it is broken."""
+        if float(self._value(joint, "broken")) > 0.0:
+            return
+        bodies = self.world.bodies
+        ends = []
+        for thing, place, axes in joint.ends:
+            if isinstance(thing, Body):
+                k = self.world._index(thing)
+                turn = rotation_matrix(bodies.orientation[self.index, k])
+                ends.append((bodies.position[self.index, k] + turn @ place, turn @ axes))
+            else:
+                ends.append((place if thing is None else self._of(thing) + place, axes))
+        (a, axes), (b, _) = ends
+        self.drawing.circle(a, _NODE * self.extent, color=palette.LOAD, layer=1)
+        if isinstance(joint, DistanceJoint):
+            self.drawing.line(a, b, color=palette.STEEL, width=_ROD * self.extent)
+        elif joint.drives:
+            half = 4.0 * _NODE * self.extent * axes[:, 0]
+            self.drawing.line(a - half, a + half, color=palette.LOAD, pixels=2.0, layer=1)
+
+    def _body_contacts(self) -> None:
+        """A ring and the force's direction wherever bodies bear on each other."""
+        contacts = self.world.contacts
+        for place, force in zip(
+            contacts.place[self.index], contacts.force[self.index], strict=True
+        ):
+            size = float(np.linalg.norm(force))
+            if size > 0.0:
+                self._touch(place, force / size)
 
     def _contacts(self, generator: Any) -> None:
         """A ring and the normal wherever a particle touches."""

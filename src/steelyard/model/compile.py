@@ -63,6 +63,7 @@ class Model:
         places: first state row and size of what varies, by (thing, name).
         recipe: stages of a step in order, each with its part.
         met: things of every pair of colliders that can meet.
+        pairs: the numbers of these colliders, (pairs, 2) int64.
         numbers: settings and local geometry of rigid contacts.
         blocks: number of matrix blocks.
         skip: entries of the flags of blocks and what stands behind them.
@@ -78,6 +79,7 @@ class Model:
     places: dict[Key, tuple[int, int]] = field(default_factory=dict)
     recipe: Recipe = ()
     met: tuple[tuple[Any, Any], ...] = ()
+    pairs: np.ndarray = field(default_factory=lambda: np.zeros((0, 2), dtype=np.int64))
     numbers: np.ndarray = field(default_factory=lambda: np.zeros(0))
     skip: int = 0
     blocks: int = 0

@@ -113,6 +113,7 @@ class Rigid:
             return
         owner = self.colliders.owner
         c.model.met = tuple((owner[a], owner[b]) for a, b, _ in self.pairs)
+        c.model.pairs = np.array([(a, b) for a, b, _ in self.pairs], dtype=np.int64).reshape(-1, 2)
         things = self._things
         index = {id(thing): i for i, thing in enumerate(things)}
         solids = [word for thing in things for word in self._solid(thing)]

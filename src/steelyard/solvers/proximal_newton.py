@@ -84,6 +84,8 @@ from .rigid_newton import contact_at, contact_ends
 _SHARE, _FASTEST = 0.2, 3.0
 # A gap [m] at which a contact that carried nothing is closed all the same.
 _CLOSED = 1e-10
+# A gap [m] that nothing closes.
+_AT_REST = 1e-9
 
 
 @dataclass(frozen=True)
@@ -205,7 +207,9 @@ def _position_stage(tape, s, n, rigid, k, dt):
         _rebounds(tape, s, n, rigid, k, count, dt)
     for i in range(count):
         c = contact_at(tape, rigid, i)
-        s[c + C_LEAST] = -max(s[c + C_GAP], 0.0) / dt
+        gap = s[c + C_GAP]
+        # What rests keeps its gap: else impulses would change with its rounding at every step.
+        s[c + C_LEAST] = -gap / dt if gap > _AT_REST else 0.0
     begin_joints(tape, s, rigid, k, dt, POSITIONS)
     taut = tautness(tape, s, rigid, k, dt)
     solve_islands(tape, s, n, rigid, count, k, False)

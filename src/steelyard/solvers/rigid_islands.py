@@ -5,7 +5,14 @@ from __future__ import annotations
 from math import sqrt
 
 from ..constraints.contact_rows import accelerate, add_impulse, length, relative_velocity
-from ..constraints.joint_rows import add_row_impulse, joint_at, joint_solids, row_at
+from ..constraints.joint_rows import (
+    add_row_impulse,
+    joint_at,
+    joint_solids,
+    row_at,
+    row_impulse,
+    row_velocity,
+)
 from ..constraints.solids import solid_at, symmetric_times
 from ..kernel import inner
 from ..math.pointers import LANES, doubles_at
@@ -50,7 +57,7 @@ from ..model.rigid_layout import (
 from ..model.tape import H_UNSETTLED
 from .block_cholesky import SIX
 from .islands import gather_island, join
-from .rigid_newton import contact_at, contact_ends, is_free, minimise
+from .rigid_newton import contact_at, contact_ends, impulse_at, is_free, minimise
 
 # Compliance of the fallback, which is solved once, and of the push, over the mobility of a contact.
 _SOFT, _PUSH = 1e-4, 1e-3
@@ -58,6 +65,8 @@ _SOFT, _PUSH = 1e-4, 1e-3
 _POLISH, _POLISHED, _POLISHES, _POLISH_STEPS = 1e-3, 1e-12, 2, 3
 # Solids of an island in which it is worth that.
 _FEW = 2
+# Error of velocities [m/s or rad/s] at which an island keeps its impulses: what is at rest costs a test.
+_AT_REST = 2e-11
 
 
 @inner
@@ -111,19 +120,66 @@ def _polish(tape, s, n, rigid, size, contacts, joints, rows):
 
 
 @inner
+def _unsettled(s, c, u0, u1, u2):
+    """Compliance times the change of a contact's impulse by a pass: how far a velocity is from what it must be."""
+    l0, l1, l2, _, _, _, _ = impulse_at(s, c, u0, u1, u2)
+    return s[c + C_COMPLIANCE] * length(
+        l0 - s[c + C_BEFORE], l1 - s[c + C_BEFORE + 1], l2 - s[c + C_BEFORE + 2]
+    )
+
+
+@inner
+def _unsettled_joint(tape, s, rigid, j):
+    """The same of a joint's rows."""
+    joint = joint_at(tape, rigid, j)
+    a, b = joint_solids(tape, rigid, joint)
+    row = row_at(tape, rigid, tape[joint + 4])
+    change = 0.0
+    for _ in range(tape[joint + 5]):
+        if s[row + J_KIND] != OFF:
+            value, _ = row_impulse(s, row, row_velocity(s, row, a, b, S_VELOCITY))
+            left = value + s[row + J_OFFSET] - s[row + J_BEFORE]
+            change = max(change, s[row + J_COMPLIANCE] * abs(left))
+        row += ROW_ENTRIES
+    return change
+
+
+@inner
+def _keep_last(tape, s, n, rigid, contacts, joints):
+    """Let the impulses of the last stage be those of this."""
+    for j in range(contacts):
+        c = contact_at(tape, rigid, n[tape[rigid + LIST] + j])
+        for k in range(3):
+            s[c + C_IMPULSE + k] = s[c + C_BEFORE + k]
+    for j in range(joints):
+        joint = joint_at(tape, rigid, n[tape[rigid + HELD] + j])
+        row = row_at(tape, rigid, tape[joint + 4])
+        for _ in range(tape[joint + 5]):
+            s[row + J_IMPULSE] = s[row + J_BEFORE] - s[row + J_OFFSET]
+            row += ROW_ENTRIES
+
+
+@inner
 def _solve_island(tape, s, n, rigid, size, contacts, joints, rows):
     """All passes of an island; whether they settled."""
     numbers = doubles_at(tape[rigid + NUMBERS])
     tolerance = numbers[N_TOLERANCE]
     iterations = int(numbers[N_ITERATIONS])
     _begin_velocity(tape, s, n, rigid, size, contacts, joints, True)
+    change = 0.0
     for j in range(contacts):
         i = n[tape[rigid + LIST] + j]
         c = contact_at(tape, rigid, i)
         a, b = contact_ends(tape, n, rigid, i)
         s[c + C_COMPLIANCE] = numbers[N_COMPLIANCE] * s[c + C_WEIGHT]
-        _, u1, u2 = relative_velocity(s, c, a, b, S_VELOCITY)
+        u0, u1, u2 = relative_velocity(s, c, a, b, S_VELOCITY)
         s[c + C_SHIFT] = sqrt(u1 * u1 + u2 * u2)
+        change = max(change, _unsettled(s, c, u0, u1, u2))
+    for j in range(joints):
+        change = max(change, _unsettled_joint(tape, s, rigid, n[tape[rigid + HELD] + j]))
+    if change <= _AT_REST:
+        _keep_last(tape, s, n, rigid, contacts, joints)
+        return True
     moved = False
     settled = False
     for _ in range(int(numbers[N_PASSES])):

@@ -74,6 +74,8 @@ from .block_cholesky import SIX, clear_rows, factorise, solve_factored
 from .friction_cone import project, projection_derivative
 
 _HALVINGS = 30
+# Share of the tolerance at which no step is taken at all.
+_UNTOUCHED = 0.01
 _FLAT = 1e-3
 # Residual that rounding may leave where no step lessens it.
 _ROUNDING = 1e-6
@@ -100,7 +102,7 @@ def is_free(s, solid):
 
 
 @inner
-def _impulse_at(s, c, u0, u1, u2):
+def impulse_at(s, c, u0, u1, u2):
     """Impulse of a contact at a velocity."""
     stiffness = 1.0 / s[c + C_COMPLIANCE]
     yn = s[c + C_BEFORE] + (s[c + C_LEAST] - s[c + C_FRICTION] * s[c + C_SHIFT] - u0) * stiffness
@@ -122,7 +124,7 @@ def _evaluate(tape, s, n, rigid, size, contacts, joints):
         c = contact_at(tape, rigid, i)
         a, b = contact_ends(tape, n, rigid, i)
         u0, u1, u2 = relative_velocity(s, c, a, b, S_VELOCITY)
-        l0, l1, l2, case, reach, y1, y2 = _impulse_at(s, c, u0, u1, u2)
+        l0, l1, l2, case, reach, y1, y2 = impulse_at(s, c, u0, u1, u2)
         s[c + C_SPEED] = u0
         s[c + C_SPEED + 1] = u1
         s[c + C_SPEED + 2] = u2
@@ -362,7 +364,7 @@ def _slope(tape, s, n, rigid, contacts, joints, start, rise, step):
         d0 = s[c + C_CHANGE]
         d1 = s[c + C_CHANGE + 1]
         d2 = s[c + C_CHANGE + 2]
-        l0, l1, l2, _, _, _, _ = _impulse_at(
+        l0, l1, l2, _, _, _, _ = impulse_at(
             s,
             c,
             s[c + C_SPEED] + step * d0,
@@ -474,7 +476,8 @@ def minimise(tape, s, n, rigid, size, contacts, joints, rows, tolerance, iterati
     last = 0.0
     for iteration in range(iterations):
         error, scale = _evaluate(tape, s, n, rigid, size, contacts, joints)
-        if error <= tolerance * scale:
+        # One step takes far more off than is asked for: without any, that must be there already, or it stays for good.
+        if error <= (tolerance if iteration > 0 else _UNTOUCHED * tolerance) * scale:
             return iteration
         if not error < 1e300:
             return -1
