@@ -19,7 +19,15 @@ from rich.table import Table
 
 from benchmarks.figures import Figure
 
-BENCHMARKS = ("against_mujoco", "scaling", "environments", "links", "planar", "undeclared")
+BENCHMARKS = (
+    "against_mujoco",
+    "bodies",
+    "scaling",
+    "environments",
+    "links",
+    "planar",
+    "undeclared",
+)
 
 
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")

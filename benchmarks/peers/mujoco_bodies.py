@@ -12,13 +12,13 @@ from typing import Any, Literal
 
 import mujoco
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 import steelyard as sy
-from steelyard.scene.shapes import quaternion_times, rotation_matrix
 
 Form = Literal["tree", "equalities"]
 # From MuJoCo's z to the y along which our capsules lie and our grounds face.
-_UPRIGHT = np.array((np.sqrt(0.5), -np.sqrt(0.5), 0.0, 0.0))
+_UPRIGHT = Rotation.from_euler("x", -90, degrees=True)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,7 +49,12 @@ def build(scene: sy.Scene, settings: BodySettings) -> tuple[mujoco.MjModel, mujo
     world = ET.SubElement(root, "worldbody")
     for ground in scene.of(sy.Ground):
         friction = f"{ground.friction!r} 0.005 0.0001"
-        plane = {"type": "plane", "size": "0 0 1", "quat": _text(_UPRIGHT), "friction": friction}
+        plane = {
+            "type": "plane",
+            "size": "0 0 1",
+            "quat": _quaternion(_UPRIGHT),
+            "friction": friction,
+        }
         ET.SubElement(world, "geom", plane)
     friction = max((c.friction for c in scene.of(sy.Collisions)), default=0.0)
     joints = scene.of(sy.BallJoint, sy.HingeJoint)
@@ -62,7 +67,7 @@ def build(scene: sy.Scene, settings: BodySettings) -> tuple[mujoco.MjModel, mujo
             world if parent is None else elements[id(parent)], "body", name=f"body {index}"
         )
         element.set("pos", _text(_local(parent, np.array(body.position))))
-        element.set("quat", _text(_relative(parent, np.array(body.orientation))))
+        element.set("quat", _quaternion(_relative(parent, _turn(body.orientation))))
         if joint is None:
             ET.SubElement(element, "freejoint")
         else:
@@ -82,23 +87,30 @@ def _text(values: Any) -> str:
     return " ".join(repr(float(value)) for value in values)
 
 
+def _turn(quaternion: Any) -> Rotation:
+    """From (w, x, y, z)."""
+    return Rotation.from_quat(np.roll(np.array(quaternion), -1))
+
+
+def _quaternion(turn: Rotation) -> str:
+    """As (w, x, y, z) in words."""
+    return _text(np.roll(turn.as_quat(), 1))
+
+
 def _local(parent: sy.Body | None, place: np.ndarray) -> np.ndarray:
     if parent is None:
         return place
-    return rotation_matrix(np.array(parent.orientation)).T @ (place - np.array(parent.position))
+    return np.asarray(_turn(parent.orientation).inv().apply(place - np.array(parent.position)))
 
 
-def _relative(parent: sy.Body | None, turn: np.ndarray) -> np.ndarray:
-    if parent is None:
-        return turn
-    w, x, y, z = parent.orientation
-    return quaternion_times(np.array((w, -x, -y, -z)), turn)
+def _relative(parent: sy.Body | None, turn: Rotation) -> Rotation:
+    return turn if parent is None else _turn(parent.orientation).inv() * turn
 
 
 def _joint(joint: sy.BallJoint | sy.HingeJoint, body: sy.Body) -> dict[str, str]:
     found = {"type": "ball", "pos": _text(_local(body, np.array(joint.place)))}
     if isinstance(joint, sy.HingeJoint):
-        axis = rotation_matrix(np.array(body.orientation)).T @ np.array(joint.axis)
+        axis = _turn(body.orientation).inv().apply(np.array(joint.axis))
         found |= {"type": "hinge", "axis": _text(axis)}
         if np.isfinite((joint.drive.low, joint.drive.high)).all():
             found |= {"limited": "true", "range": _text((joint.drive.low, joint.drive.high))}
@@ -106,7 +118,7 @@ def _joint(joint: sy.BallJoint | sy.HingeJoint, body: sy.Body) -> dict[str, str]
 
 
 def _geom(part: sy.Part, friction: float) -> dict[str, str]:
-    shape, turn = part.shape, np.array(part.orientation)
+    shape, turn = part.shape, _turn(part.orientation)
     found = {
         "pos": _text(part.offset), "density": repr(part.density),
         "friction": f"{friction!r} 0.005 0.0001",
@@ -114,13 +126,13 @@ def _geom(part: sy.Part, friction: float) -> dict[str, str]:
     if isinstance(shape, sy.Sphere):
         return found | {"type": "sphere", "size": repr(shape.radius)}
     if isinstance(shape, sy.Box):
-        return found | {"type": "box", "size": _text(shape.half_size), "quat": _text(turn)}
+        return found | {"type": "box", "size": _text(shape.half_size), "quat": _quaternion(turn)}
     assert isinstance(shape, sy.Capsule)
     size = _text((shape.radius, shape.half_length))
     return found | {
         "type": "capsule",
         "size": size,
-        "quat": _text(quaternion_times(turn, _UPRIGHT)),
+        "quat": _quaternion(turn * _UPRIGHT),
     }
 
 
@@ -145,6 +157,8 @@ class BodyFlight:
     def __init__(self, scene: sy.Scene, settings: BodySettings) -> None:
         self.scene, self.settings = scene, settings
         self.model, self.data = build(scene, settings)
+        # A tree has its bodies in another order.
+        self._index = [self.model.body(f"body {k}").id for k in range(len(scene.bodies))]
         self._ends = [
             [(scene.bodies.index(thing), place) for thing, place, _ in joint.ends]
             for joint in scene.of(sy.BallJoint, sy.HingeJoint)
@@ -153,7 +167,7 @@ class BodyFlight:
     def push(self, velocity: np.ndarray, spin: np.ndarray) -> None:
         """Add to the velocities and spins (bodies, 3) of free bodies, in the world's axes."""
         for k in range(len(self.scene.bodies)):
-            turn = self.data.xmat[k + 1].reshape(3, 3)
+            turn = self.data.xmat[self._index[k]].reshape(3, 3)
             self.data.qvel[6 * k : 6 * k + 3] += velocity[k]
             self.data.qvel[6 * k + 3 : 6 * k + 6] += turn.T @ spin[k]
 
@@ -164,7 +178,7 @@ class BodyFlight:
     @property
     def position(self) -> np.ndarray:
         """Of all bodies [m], (bodies, 3)."""
-        return np.array(self.data.xpos[1:])
+        return np.array(self.data.xpos[self._index])
 
     @property
     def penetration(self) -> float:
@@ -174,7 +188,7 @@ class BodyFlight:
     @property
     def gap(self) -> float:
         """Of the most open joint [m]."""
-        turns = self.data.xmat[1:].reshape(-1, 3, 3)
+        turns = self.data.xmat[self._index].reshape(-1, 3, 3)
         worst = 0.0
         for (a, at_a), (b, at_b) in self._ends:
             apart = self.position[a] + turns[a] @ at_a - self.position[b] - turns[b] @ at_b

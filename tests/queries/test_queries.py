@@ -153,7 +153,7 @@ def test_a_tree_finds_what_trying_all_finds(kind: str, monkeypatch: pytest.Monke
     start, way = rng.uniform(-7, 7, (80, 3)) + np.array((0, 8, 0)), rng.normal(size=(80, 3))
     answers = []
     for many in (1, 10**9):
-        monkeypatch.setattr(ask, "MANY", many)
+        monkeypatch.setattr(ask.Queries, "many", many)
         for every in (False, True):
             if kind == "ray":
                 answers.append(world.queries.ray(start, way, every=every))

@@ -343,3 +343,37 @@ def _turn(s, q, k, dt, at):
     s[LANES * (q + 1) + k] = nx * inverse
     s[LANES * (q + 2) + k] = ny * inverse
     s[LANES * (q + 3) + k] = nz * inverse
+
+
+@inner
+def pay_for_lifts(tape, s, rigid, k, dt):
+    """Take the work that moving solids did against their acceleration out of their own motion in lane k.
+
+    A push knows no energy: what it lifts would fall again, and gain by it.
+    """
+    record = tape[rigid + SOLID_RECORDS]
+    for i in range(tape[rigid + SOLIDS]):
+        at = solid_at(tape, rigid, i)
+        if s[at + S_MOVES] != 0.0:
+            work = 0.0
+            energy = 0.0
+            for c in range(3):
+                v = s[LANES * (tape[record + 2] + c) + k]
+                work -= s[LANES * (tape[record + 8] + c) + k] * dt * s[at + S_VELOCITY + c]
+                energy += 0.5 * v * v
+            work *= s[at + S_MASS]
+            energy *= s[at + S_MASS]
+            turns = s[at + S_TURNS] != 0.0
+            if turns:
+                p = LANES * tape[record + 3] + k
+                a, b, c = symmetric_times(
+                    s, at + S_INVERSE_INERTIA, s[p], s[p + LANES], s[p + 2 * LANES]
+                )
+                energy += 0.5 * (a * s[p] + b * s[p + LANES] + c * s[p + 2 * LANES])
+            if work > 0.0 and energy > 0.0:
+                share = sqrt(max(1.0 - work / energy, 0.0))
+                for c in range(3):
+                    s[LANES * (tape[record + 2] + c) + k] *= share
+                    if turns:
+                        s[LANES * (tape[record + 3] + c) + k] *= share
+        record += SOLID

@@ -46,6 +46,7 @@ class Bodies:
         self._records: list[int] = []
         self._inverses: dict[int, int] = {}
         self._inertias: dict[int, int] = {}
+        self._accelerations: dict[int, int] = {}
         self._masses: dict[int, int] = {}
 
     def state(self) -> None:
@@ -98,6 +99,15 @@ class Bodies:
                 else self._c.constant(0.0, 6)
             )
         return self._inverses[id(body)]
+
+    def acceleration(self, body: Body) -> int:
+        """Rows of a body's constant acceleration."""
+        if id(body) not in self._accelerations:
+            three = slice(3 * self.index[id(body)], 3 * self.index[id(body)] + 3)
+            self._accelerations[id(body)] = self._c.slot(
+                3, ((BODIES, "acceleration"),), lambda value: value[three]
+            )
+        return self._accelerations[id(body)]
 
     def _inertia(self, body: Body) -> int:
         """Rows of the inertia."""
@@ -224,13 +234,10 @@ class Bodies:
         else:
             damping = self.powers(integrator.damping_share * c.method.substep)
         for place, body in enumerate(moving):
-            k = self.index[id(body)]
             *state, mass, inertia, inverse = self.rows(body)
             c.sections["bodies"] += [
                 *state, self._wrenches.get(id(body), nothing), mass, inertia, inverse,
-                c.slot(
-                    3, ((BODIES, "acceleration"),), lambda value, k=k: value[3 * k : 3 * k + 3]
-                ),
+                self.acceleration(body),
                 damping + 2 * place,
                 c.take(work),
                 *self._pivot(body),

@@ -143,11 +143,21 @@ class Rigid:
         flags = int(thing.movable)
         if isinstance(thing, Particle):
             mass = c.header["inverse_mass"] + c.of(thing)
-            return [c.at("position", thing), -1, c.at("velocity", thing), -1, mass, -1, -1, flags]
+            own = c.at("acceleration", thing)
+            return [
+                c.at("position", thing),
+                -1,
+                c.at("velocity", thing),
+                -1,
+                mass,
+                -1,
+                -1,
+                flags,
+                own,
+            ]
         if thing.movable:
             flags = 3 if thing.pivot is None else 2
-        rows = c.bodies.rows(thing)
-        return [*rows, flags]
+        return [*c.bodies.rows(thing), flags, c.bodies.acceleration(thing)]
 
     def _collider(self, k: int, index: dict[int, int]) -> list[int]:
         """Record of a collider."""

@@ -16,8 +16,8 @@ from __future__ import annotations
 ) = range(36)  # fmt: skip
 
 # Record of a solid (body or particle): rows of position, orientation, velocity, angular momentum, inverse mass, inertia
-# and its inverse, -1 where it has none; whether it moves (1) and turns (2).
-SOLID = 8
+# and its inverse, -1 where it has none; whether it moves (1) and turns (2); rows of its constant acceleration.
+SOLID = 9
 # Record of a collider: kind, solid or -1, its number, and rows of a ground's plane or of a particle's radius.
 COLLIDER = 4
 # Record of a pair: colliders a and b, of which a can move; rows of restitution and friction.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -61,6 +61,8 @@ class Queries:
     """
 
     __slots__ = ("_world",)
+    #: Shapes from which on a tree of boxes is planted over them, and not all are tried.
+    many: ClassVar[int] = MANY
 
     def __init__(self, world: World) -> None:
         self._world = world
@@ -220,7 +222,7 @@ class Queries:
         placed = placed_colliders(self._world)
         if way is None:
             overlap_many(
-                colliders.kind, placed, allowed, kind, query, n >= MANY, found, hits, *work
+                colliders.kind, placed, allowed, kind, query, n >= self.many, found, hits, *work
             )
         else:
             cast_many(
@@ -232,7 +234,7 @@ class Queries:
                 way,
                 reach,
                 every,
-                n >= MANY,
+                n >= self.many,
                 found,
                 hits,
                 *work,

@@ -37,6 +37,7 @@ from ..constraints.joints import POSITIONS, PUSHES, VELOCITIES, begin_joints, st
 from ..constraints.solids import (
     gather_solids,
     move_solids,
+    pay_for_lifts,
     rest_solids,
     scatter_velocities,
     solid_at,
@@ -260,6 +261,7 @@ def _push_apart(tape, s, n, rigid, k, count, dt, slop):
     begin_joints(tape, s, rigid, k, dt, PUSHES)
     solve_islands(tape, s, n, rigid, count, k, True)
     move_solids(tape, s, rigid, k, dt)
+    pay_for_lifts(tape, s, rigid, k, dt)
 
 
 @stage

@@ -1,0 +1,296 @@
+"""Rigid bodies beside MuJoCo on one core: a stack, a heap, a ragdoll; cost over the number of bodies; rays.
+
+MuJoCo steps one world per model and is timed on some of the worlds; the engine steps all of them. What both are held
+to stands beside the cost: penetration, gaps of joints, and the largest gain of energy between looks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import steelyard as sy
+from benchmarks import record
+from benchmarks.figures import Announce, Figure
+from benchmarks.peers.mujoco_bodies import BodyFlight, BodySettings
+
+STAGES = ("stack", "heap", "ragdoll", "growth", "rays")
+DT = 0.01
+Measured = dict[str, dict[str, float]]
+Readings = dict[str, Callable[[], float]]
+Readings = dict[str, Callable[[], float]]
+
+
+def run(*, quick: bool, output: Path, announce: Announce) -> list[Figure]:
+    """Measure all and write bodies.json to ``output``."""
+    results: dict[str, Any] = {}
+    figures: list[Figure] = []
+    for name in STAGES:
+        announce(name)
+        results[name], found = _MEASURES[name](quick)
+        figures += found
+    payload = {
+        "quick": quick, "dt": DT,
+        "units": {"per_step": "us", "penetration, gap": "m", "gain": "of the start's energy above its end"},
+        "figures": [figure.record() for figure in figures], "scenes": results,
+    }  # fmt: skip
+    record.write("bodies", payload, directory=output)
+    return figures
+
+
+def stack(count: int) -> sy.Scene:
+    """Boxes of a metre on each other."""
+    scene = sy.Scene()
+    for i in range(count):
+        scene.add(sy.Body(position=(0, 0.5 + i, 0), parts=sy.Box((0.5, 0.5, 0.5))))
+    return _grounded(scene)
+
+
+def heap(count: int, seed: int) -> sy.Scene:
+    """Boxes and balls in turn, strewn above the ground."""
+    rng = np.random.default_rng(seed)
+    scene = sy.Scene()
+    wide = 0.6 * np.sqrt(count)
+    for i in range(count):
+        half = rng.uniform(0.2, 0.5, 3)
+        shape = sy.Sphere(float(half[0])) if i % 2 else sy.Box(tuple(half))
+        x, z = rng.uniform(-0.5 * wide, 0.5 * wide, 2)
+        place = (x, 1.0 + 0.5 * i, z)
+        scene.add(sy.Body(position=place, orientation=tuple(rng.normal(size=4)), parts=shape))
+    return _grounded(scene)
+
+
+def _grounded(scene: sy.Scene) -> sy.Scene:
+    scene.add(sy.Ground(friction=0.6))
+    scene.add(sy.Collisions(friction=0.6))
+    return scene
+
+
+def _world(scene: sy.Scene, worlds: int, dt: float = DT) -> sy.World:
+    return sy.World(scene, worlds=worlds, method=sy.Method(sy.Rattle(), sy.ProximalNewton(), dt=dt))
+
+
+def _timed(
+    functions: dict[str, tuple[Callable[[], object], float]], repeats: int
+) -> dict[str, float]:
+    """CPU time of each per step of one world [us], in turns; given what to call and how many such steps that is."""
+    times = record.interleave(
+        {name: call for name, (call, _) in functions.items()}, repeats=repeats
+    )
+    return {name: 1e6 * times[name] / functions[name][1] for name in functions}
+
+
+def _stack(quick: bool) -> tuple[Any, list[Figure]]:
+    """Ten boxes that stand."""
+    worlds, settle, steps = (8, 50, 5) if quick else (256, 400, 50)
+    ours = _world(stack(10), worlds)
+    ours.bodies.position[:, :, 0] += 1e-3 * np.random.default_rng(0).uniform(size=(worlds, 10))
+    ours.step(settle)
+    calls: dict[str, tuple[Callable[[], object], float]] = {
+        "Rattle, ProximalNewton": (lambda: ours.step(steps), worlds * steps)
+    }
+    flights = {}
+    for cone in ("pyramidal", "elliptic"):
+        flight = BodyFlight(stack(10), BodySettings(dt=DT, cone=cone))
+        flight.step(settle)
+        flights[f"MuJoCo, {cone}"] = flight
+        calls[f"MuJoCo, {cone}"] = (lambda flight=flight: flight.step(20 * steps), 20 * steps)
+    cost = _timed(calls, 1 if quick else 7)
+    top = {name: float(flight.position[-1, 1]) for name, flight in flights.items()}
+    deep = {name: flight.penetration for name, flight in flights.items()}
+    deep["Rattle, ProximalNewton"] = float(ours.penetration.max())
+    top["Rattle, ProximalNewton"] = float(ours.bodies.position[:, -1, 1].min())
+    found = {
+        name: {"per_step": cost[name], "penetration": deep[name], "top": top[name]} for name in cost
+    }
+    best = min(cost[name] for name in flights)
+    return found, [
+        Figure(name="stack of ten: MuJoCo over ours", measured=best / cost["Rattle, ProximalNewton"], at_least=5.0),
+        Figure(name="stack of ten: penetration", measured=deep["Rattle, ProximalNewton"], unit="m",
+               at_most=min(deep[name] for name in flights)),
+    ]  # fmt: skip
+
+
+def _read_world(world: sy.World) -> tuple[Callable[[], None], Readings]:
+    """What steps worlds by five, and what is read of them."""
+    readings: Readings = {
+        "energy": lambda: float(world.energy.sum()),
+        "penetration": lambda: float(world.penetration.max()),
+        "gap": lambda: float(world.joints.gap.max(initial=0.0)),
+    }
+    return lambda: world.step(5), readings
+
+
+def _read_flight(flight: BodyFlight) -> tuple[Callable[[], None], Readings]:
+    """The same of MuJoCo."""
+    readings: Readings = {
+        "energy": lambda: flight.energy,
+        "penetration": lambda: flight.penetration,
+        "gap": lambda: flight.gap,
+    }
+    return lambda: flight.step(5), readings
+
+
+def _fly(step: Callable[[], None], read: Readings, looks: int) -> dict[str, float]:
+    """Largest of what is read at looks, and of energy the largest gain between them over its whole fall."""
+    most = dict.fromkeys((name for name in read if name != "energy"), 0.0)
+    energies = [read["energy"]()]
+    for _ in range(looks):
+        step()
+        for name in most:
+            most[name] = max(most[name], read[name]())
+        energies.append(read["energy"]())
+    fall = max(energies[0] - min(energies), 1e-300)
+    return {**most, "gain": max(0.0, float(np.diff(energies).max())) / fall}
+
+
+def _heap(quick: bool) -> tuple[Any, list[Figure]]:
+    """Ten boxes and ten balls that fall and come to rest, 10 s."""
+    worlds, steps, peers = (4, 50, 2) if quick else (256, 1000, 16)
+    rng = np.random.default_rng(5)
+    turns = rng.normal(size=(worlds, 20, 4))
+    turns /= np.linalg.norm(turns, axis=-1, keepdims=True)
+    found: Measured = {}
+
+    def start(dt: float, count: int) -> sy.World:
+        world = _world(heap(20, 1), count, dt)
+        world.bodies.orientation[:] = turns[:count]
+        return world
+
+    for dt in (DT, 1 / 60):
+        world = start(dt, min(worlds, 16))
+        looks = round(steps * DT / dt) // 5
+        found[f"ours, dt {dt:.4f}"] = _fly(*_read_world(world), looks)
+    for dt in (0.002, 0.005, DT):
+        flight = BodyFlight(heap(20, 1), BodySettings(dt=dt, cone="elliptic"))
+        looks = round(steps * DT / dt) // 5
+        found[f"MuJoCo, dt {dt:.4f}"] = _fly(*_read_flight(flight), looks)
+    calls: dict[str, tuple[Callable[[], object], float]] = {}
+    for dt in (DT, 1 / 60):
+        count = round(steps * DT / dt)
+        calls[f"ours, dt {dt:.4f}"] = (
+            lambda dt=dt, count=count: start(dt, worlds).step(count),
+            worlds * steps * DT,
+        )
+    for dt in (0.002, 0.005, DT):
+        count = round(steps * DT / dt)
+
+        def fly(dt: float = dt, count: int = count) -> None:
+            for _ in range(peers):
+                BodyFlight(heap(20, 1), BodySettings(dt=dt, cone="elliptic")).step(count)
+
+        calls[f"MuJoCo, dt {dt:.4f}"] = (fly, peers * steps * DT)
+    cost = _timed(calls, 1)
+    for name in found:
+        found[name]["per_second"] = cost[name]
+    able = [
+        (cost[theirs] / cost[ours], ours, theirs)
+        for theirs in found if theirs.startswith("MuJoCo")
+        for ours in found if ours.startswith("ours")
+        and found[ours]["penetration"] <= found[theirs]["penetration"] and found[ours]["gain"] <= found[theirs]["gain"]
+    ]  # fmt: skip
+    worst = min(
+        (max(r for r, _, t in able if t == theirs) for theirs in {t for _, _, t in able}),
+        default=0.0,
+    )
+    return found, [
+        Figure(name="heap of 20: MuJoCo over ours of no larger penetration and gain, at its best step",
+               measured=worst, at_least=3.0),
+    ]  # fmt: skip
+
+
+def _ragdoll(quick: bool) -> tuple[Any, list[Figure]]:
+    """A ragdoll that falls from half a metre, 4 s."""
+    worlds, steps, peers = (4, 40, 2) if quick else (1024, 400, 8)
+    rng = np.random.default_rng(6)
+    spin = rng.normal(size=(worlds, 12, 3))
+
+    def start(count: int) -> sy.World:
+        world = _world(sy.scenes.ragdoll(height=0.5), count)
+        world.bodies.angular_velocity = spin[:count]
+        return world
+
+    def peer(index: int) -> BodyFlight:
+        flight = BodyFlight(sy.scenes.ragdoll(height=0.5), BodySettings(dt=DT))
+        flight.push(np.zeros((12, 3)), spin[index])
+        return flight
+
+    world, flight = start(min(worlds, 16)), peer(0)
+    found = {
+        "ours": _fly(*_read_world(world), steps // 5),
+        "MuJoCo": _fly(*_read_flight(flight), steps // 5),
+    }
+
+    def fly() -> None:
+        for index in range(peers):
+            peer(index).step(steps)
+
+    cost = _timed(
+        {
+            "ours": (lambda: start(worlds).step(steps), worlds * steps),
+            "MuJoCo": (fly, peers * steps),
+        },
+        1,
+    )
+    for name in found:
+        found[name]["per_step"] = cost[name]
+    return found, [
+        Figure(
+            name="ragdoll: MuJoCo over ours", measured=cost["MuJoCo"] / cost["ours"], at_least=8.0
+        ),
+        Figure(
+            name="ragdoll: gap of joints",
+            measured=found["ours"]["gap"],
+            unit="m",
+            at_most=found["MuJoCo"]["gap"],
+        ),
+    ]
+
+
+def _growth(quick: bool) -> tuple[Any, list[Figure]]:
+    """Heaps of more and more bodies in one world, for 4 s."""
+    counts: Sequence[int] = (10, 20) if quick else (10, 20, 40, 80, 160)
+    steps = 20 if quick else 400
+    calls = {
+        str(count): (lambda count=count: _world(heap(count, 2), 1).step(steps), float(steps))
+        for count in counts
+    }
+    cost = _timed(calls, 1 if quick else 3)
+    exponent = float(
+        np.polyfit(np.log(counts), np.log([cost[str(count)] for count in counts]), 1)[0]
+    )
+    found = {"per_step": cost, "exponent": exponent}
+    return found, [
+        Figure(name="growth with the number of bodies", measured=exponent, unit="", at_most=1.3)
+    ]
+
+
+def _rays(quick: bool) -> tuple[Any, list[Figure]]:
+    """A thousand rays against a hundred bodies: with a tree, and trying all."""
+
+    rng = np.random.default_rng(0)
+    rays = 50 if quick else 1000
+    world = _world(heap(100, 3), 1)
+    start, way = rng.uniform(-15, 15, (rays, 3)) + np.array((0, 20, 0)), rng.normal(size=(rays, 3))
+
+    def cast(many: int) -> None:
+        queries = type(world.queries)
+        kept, queries.many = queries.many, many
+        try:
+            for _ in range(3):
+                world.queries.ray(start, way)
+        finally:
+            queries.many = kept
+
+    calls = {"tree": (lambda: cast(1), 3.0 * rays), "all": (lambda: cast(10**9), 3.0 * rays)}
+    cost = _timed(calls, 1 if quick else 7)
+    ratio = cost["all"] / cost["tree"]
+    return {"per_ray": cost}, [
+        Figure(name="1000 rays, 100 bodies: all over tree", measured=ratio, at_least=5.0)
+    ]
+
+
+_MEASURES = {"stack": _stack, "heap": _heap, "ragdoll": _ragdoll, "growth": _growth, "rays": _rays}
