@@ -149,7 +149,7 @@ def _fly(step: Callable[[], None], read: Readings, looks: int) -> dict[str, floa
 
 def _heap(quick: bool) -> tuple[Any, list[Figure]]:
     """Ten boxes and ten balls that fall and come to rest, 10 s."""
-    worlds, steps, peers = (4, 50, 2) if quick else (256, 1000, 16)
+    worlds, steps, peers = (4, 50, 2) if quick else (64, 1000, 4)
     rng = np.random.default_rng(5)
     turns = rng.normal(size=(worlds, 20, 4))
     turns /= np.linalg.norm(turns, axis=-1, keepdims=True)
@@ -204,7 +204,7 @@ def _heap(quick: bool) -> tuple[Any, list[Figure]]:
 
 def _ragdoll(quick: bool) -> tuple[Any, list[Figure]]:
     """A ragdoll that falls from half a metre, 4 s."""
-    worlds, steps, peers = (4, 40, 2) if quick else (1024, 400, 8)
+    worlds, steps, peers = (4, 40, 2) if quick else (128, 400, 8)
     rng = np.random.default_rng(6)
     spin = rng.normal(size=(worlds, 12, 3))
 
@@ -258,7 +258,7 @@ def _growth(quick: bool) -> tuple[Any, list[Figure]]:
         str(count): (lambda count=count: _world(heap(count, 2), 1).step(steps), float(steps))
         for count in counts
     }
-    cost = _timed(calls, 1 if quick else 3)
+    cost = _timed(calls, 1)
     exponent = float(
         np.polyfit(np.log(counts), np.log([cost[str(count)] for count in counts]), 1)[0]
     )
