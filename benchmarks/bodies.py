@@ -58,7 +58,7 @@ def heap(count: int, seed: int) -> sy.Scene:
         half = rng.uniform(0.2, 0.5, 3)
         shape = sy.Sphere(float(half[0])) if i % 2 else sy.Box(tuple(half))
         x, z = rng.uniform(-0.5 * wide, 0.5 * wide, 2)
-        place = (x, 1.0 + 0.5 * i, z)
+        place = (x, 1.0 + 1.1 * i, z)
         scene.add(sy.Body(position=place, orientation=tuple(rng.normal(size=4)), parts=shape))
     return _grounded(scene)
 

@@ -25,7 +25,7 @@ from ..math.pointers import LANES
 from ..model.rigid_layout import J_KEPT, J_OFFSET, S_BASE, S_KEPT, S_STEP, S_VELOCITY, SOLIDS
 from ..model.tape import H_UNSETTLED
 from .block_cholesky import SIX
-from .rigid_islands import solve_islands
+from .rigid_islands import CHANGES, PUSH, solve_islands
 
 # Passes that close joints, solves that move them together, the error [m or rad] at which they are closed, and that
 # which is flagged.
@@ -60,7 +60,7 @@ def close_over_step(tape, s, n, rigid, k, dt, taut):
             closed = implicit or kinetic_energy(tape, s, rigid, S_STEP) <= bound
             break
         last = worst
-        solve_islands(tape, s, n, rigid, 0, k, False)
+        solve_islands(tape, s, n, rigid, 0, k, CHANGES)
         add_changes(tape, s, rigid)
     if not closed:
         keep_joints(tape, s, rigid, S_KEPT, S_BASE, J_KEPT, J_OFFSET)
@@ -83,7 +83,7 @@ def join_again(tape, s, n, rigid, k, dt):
         if worst <= _CLOSE:
             break
         rest_solids(tape, s, rigid)
-        solve_islands(tape, s, n, rigid, 0, k, True)
+        solve_islands(tape, s, n, rigid, 0, k, PUSH)
         move_solids(tape, s, rigid, k, dt)
     if not worst <= _OPEN:
         s[LANES * tape[H_UNSETTLED] + k] = 1.0

@@ -78,7 +78,7 @@ from ..scene import checks
 from ..stage import Stage, stage
 from .base import Solver
 from .joint_closing import close_over_step, join_again
-from .rigid_islands import solve_islands
+from .rigid_islands import ALL, PUSH, solve_islands
 from .rigid_newton import contact_at, contact_ends
 
 # Share of a penetration that one step takes away, and the fastest push [m/s].
@@ -213,7 +213,7 @@ def _position_stage(tape, s, n, rigid, k, dt):
         s[c + C_LEAST] = -gap / dt if gap > _AT_REST else 0.0
     begin_joints(tape, s, rigid, k, dt, POSITIONS)
     taut = tautness(tape, s, rigid, k, dt)
-    solve_islands(tape, s, n, rigid, count, k, False)
+    solve_islands(tape, s, n, rigid, count, k, ALL)
     closed = True
     if tape[rigid + JOINTS] > 0:
         closed = close_over_step(tape, s, n, rigid, k, dt, taut)
@@ -242,7 +242,7 @@ def _velocity_stage(tape, s, n, rigid, k, dt):
         s[c + C_LEAST] = s[c + C_REBOUND] if closed else -1e30
         deep = deep or s[c + C_GAP] < -slop
     begin_joints(tape, s, rigid, k, dt, VELOCITIES)
-    solve_islands(tape, s, n, rigid, count, k, False)
+    solve_islands(tape, s, n, rigid, count, k, ALL)
     scatter_velocities(tape, s, rigid, k)
     _store_contacts(tape, s, n, rigid, k, count)
     store_joints(tape, s, rigid, k, dt, True)
@@ -259,7 +259,7 @@ def _push_apart(tape, s, n, rigid, k, count, dt, slop):
         gap = s[c + C_GAP]
         s[c + C_LEAST] = min(-_SHARE * gap / dt, _FASTEST) if gap < -slop else -max(gap, 0.0) / dt
     begin_joints(tape, s, rigid, k, dt, PUSHES)
-    solve_islands(tape, s, n, rigid, count, k, True)
+    solve_islands(tape, s, n, rigid, count, k, PUSH)
     move_solids(tape, s, rigid, k, dt)
     pay_for_lifts(tape, s, rigid, k, dt)
 

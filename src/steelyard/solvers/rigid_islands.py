@@ -65,6 +65,9 @@ _SOFT, _PUSH = 1e-4, 1e-3
 _POLISH, _POLISHED, _POLISHES, _POLISH_STEPS = 1e-3, 1e-12, 2, 3
 # Solids of an island in which it is worth that.
 _FEW = 2
+ALL, CHANGES, PUSH = range(3)
+# Residual of a pass for changes: what it leaves, the next one finds.
+_ROUGH = 1e-5
 # Error of velocities [m/s or rad/s] at which an island keeps its impulses: what is at rest costs a test.
 _AT_REST = 2e-11
 
@@ -160,10 +163,10 @@ def _keep_last(tape, s, n, rigid, contacts, joints):
 
 
 @inner
-def _solve_island(tape, s, n, rigid, size, contacts, joints, rows):
+def _solve_island(tape, s, n, rigid, size, contacts, joints, rows, what):
     """All passes of an island; whether they settled."""
     numbers = doubles_at(tape[rigid + NUMBERS])
-    tolerance = numbers[N_TOLERANCE]
+    tolerance = numbers[N_TOLERANCE] if what == ALL else _ROUGH
     iterations = int(numbers[N_ITERATIONS])
     _begin_velocity(tape, s, n, rigid, size, contacts, joints, True)
     change = 0.0
@@ -214,7 +217,7 @@ def _solve_island(tape, s, n, rigid, size, contacts, joints, rows):
                     change = max(change, s[row + J_COMPLIANCE] * abs(value - s[row + J_BEFORE]))
                     s[row + J_BEFORE] = value
                 row += ROW_ENTRIES
-        settled = change <= numbers[N_IMPULSE] and shift <= numbers[N_SHIFT]
+        settled = what == CHANGES or (change <= numbers[N_IMPULSE] and shift <= numbers[N_SHIFT])
         if settled:
             break
     if moved and settled and size <= _FEW and joints == 0:
@@ -286,8 +289,14 @@ def _keep_joint_impulses(tape, s, n, rigid, joints):
 
 
 @inner
-def solve_islands(tape, s, n, rigid, count, k, push):
-    """Solve all islands of lane k; solids end with the impulses on them in S_VELOCITY, or pushed with velocities."""
+def solve_islands(tape, s, n, rigid, count, k, what):
+    """Solve all islands of lane k; solids end with the impulses on them in S_VELOCITY.
+
+    Args:
+        count: number of contacts that count.
+        what: ALL impulses; CHANGES of those of joints, one pass of which more follow; or a PUSH, which ends with
+            velocities.
+    """
     for j in range(tape[rigid + JOINTS]):
         joint = joint_at(tape, rigid, j)
         a, b = joint_solids(tape, rigid, joint)
@@ -307,14 +316,14 @@ def solve_islands(tape, s, n, rigid, count, k, push):
         elif local < 0:
             size, contacts, joints, rows = gather_island(tape, n, rigid, seed, count)
             good = True
-            if push:
+            if what == PUSH:
                 good = _solve_softly(tape, s, n, rigid, size, contacts, joints, rows, _PUSH)
             elif contacts + joints > 0:
-                good = _solve_island(tape, s, n, rigid, size, contacts, joints, rows)
+                good = _solve_island(tape, s, n, rigid, size, contacts, joints, rows, what)
                 if not good:
                     good = _solve_softly(tape, s, n, rigid, size, contacts, joints, rows, _SOFT)
             if not good:
                 s[LANES * tape[H_UNSETTLED] + k] = 1.0
-            if not push:
+            if what != PUSH:
                 _keep_impulses(tape, s, n, rigid, size, contacts)
                 _keep_joint_impulses(tape, s, n, rigid, joints)
