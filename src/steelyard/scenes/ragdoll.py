@@ -19,13 +19,16 @@ _TRUNK = (
 )
 
 
-def ragdoll(*, height: float = 0.0, ground: bool = True, friction: float = 0.6) -> Scene:
+def ragdoll(
+    *, height: float = 0.0, ground: bool = True, friction: float = 0.6, angular_damping: float = 1.0
+) -> Scene:
     """Hips, belly, chest, head, arms and legs of two bones: 1.79 m tall, arms level; elbows and knees are hinges.
 
     Args:
         height: of the soles above the ground [m].
         ground: whether there is one, and whether the doll's parts touch each other.
         friction: of the ground and of the parts.
+        angular_damping: fraction of its angular velocity that each part keeps per second; joints have no friction.
     """
     scene = Scene()
     parts: dict[str, Body] = {}
@@ -34,7 +37,8 @@ def ragdoll(*, height: float = 0.0, ground: bool = True, friction: float = 0.6) 
         name: str, x: float, y: float, shape: Box | Capsule | Sphere, lying: bool = False
     ) -> None:
         turn = _LYING if lying else (1.0, 0.0, 0.0, 0.0)
-        body = Body(position=(x, y + height, 0.0), orientation=turn, parts=shape)
+        place = (x, y + height, 0.0)
+        body = Body(position=place, orientation=turn, parts=shape, angular_damping=angular_damping)
         parts[name] = scene.add(body)
 
     def ball(a: str, b: str, x: float, y: float) -> None:
