@@ -18,6 +18,7 @@ from ..model.rigid_layout import (
     C_EARLIER,
     C_FRICTION,
     C_GAP,
+    C_HELD,
     C_ID,
     C_PLACE,
     C_REBOUND,
@@ -52,6 +53,7 @@ from ..model.rigid_layout import (
     SETTINGS,
     STORED,
     STORED_ROW,
+    T_HELD,
     T_ID,
     T_IMPULSE,
     T_PLACE,
@@ -240,6 +242,7 @@ def _take(tape, s, n, rigid, k, c, j):
     s[c + C_BEFORE + 1] = t1
     s[c + C_BEFORE + 2] = t2
     s[c + C_REBOUND] = s[_stored(tape, rigid, j, T_REBOUND, k)]
+    s[c + C_HELD] = s[_stored(tape, rigid, j, T_HELD, k)]
     s[c + C_EARLIER] = 1.0
     n[tape[rigid + MATCHED] + j] = 1
 
@@ -259,6 +262,7 @@ def match_contacts(tape, s, n, rigid, k, count):
         s[c + C_BEFORE + 1] = 0.0
         s[c + C_BEFORE + 2] = 0.0
         s[c + C_REBOUND] = 0.0
+        s[c + C_HELD] = 0.0
         s[c + C_EARLIER] = 0.0
         wanted = s[c + C_ID] + 1.0
         for step in range(old):

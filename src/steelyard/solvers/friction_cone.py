@@ -10,7 +10,7 @@ from math import sqrt
 
 from ..kernel import inner
 
-OPEN, STICK, SLIDE = range(3)
+OPEN, STICK, SLIDE, HELD_STICK, HELD_SLIDE = range(5)
 
 
 @inner
@@ -27,12 +27,33 @@ def project(yn, y1, y2, mu):
 
 
 @inner
+def project_beyond(yn, y1, y2, mu, held):
+    """The same for the part of the cone above a normal impulse that is there already, with a disc for a foot."""
+    l0, l1, l2, case, size = project(yn + held, y1, y2, mu)
+    if held > 0.0 and l0 < held:
+        most = mu * held
+        if size <= most:
+            return 0.0, y1, y2, HELD_STICK, size
+        share = most / size
+        return 0.0, share * y1, share * y2, HELD_SLIDE, size
+    return l0 - held, l1, l2, case, size
+
+
+@inner
 def projection_derivative(y1, y2, mu, normal, case, size):
     """Six entries (nn, n1, n2, 11, 12, 22) of the derivative where ``project`` gave the rest."""
     if case == OPEN:
         return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     if case == STICK:
         return 1.0, 0.0, 0.0, 1.0, 0.0, 1.0
+    if case == HELD_STICK:
+        return 0.0, 0.0, 0.0, 1.0, 0.0, 1.0
+    if case == HELD_SLIDE:
+        # ``normal`` is what is held.
+        e1 = y1 / size
+        e2 = y2 / size
+        across = mu * normal / size
+        return 0.0, 0.0, 0.0, across * (1.0 - e1 * e1), -across * e1 * e2, across * (1.0 - e2 * e2)
     a = 1.0 / (1.0 + mu * mu)
     if size == 0.0:
         return a, 0.0, 0.0, 0.0, 0.0, 0.0

@@ -48,7 +48,10 @@ from ..math.lanes import load, splat, store
 from ..math.pointers import LANES, doubles_at
 from ..model.rigid_layout import (
     C_BEFORE,
+    C_EARLIER,
+    C_FRICTION,
     C_GAP,
+    C_HELD,
     C_ID,
     C_IMPULSE,
     C_LEAST,
@@ -69,6 +72,7 @@ from ..model.rigid_layout import (
     START_ROW,
     STORED,
     STORED_ROW,
+    T_HELD,
     T_IMPULSE,
     T_PLACE,
     T_REBOUND,
@@ -155,6 +159,7 @@ def _store_contacts(tape, s, n, rigid, k, count):
             for i in range(3):
                 s[at + LANES * (T_PLACE + i)] = s[c + C_PLACE + i]
             s[at + LANES * T_REBOUND] = s[c + C_REBOUND]
+            s[at + LANES * T_HELD] = s[c + C_HELD]
         else:
             if s[at] == 0.0:
                 break
@@ -199,6 +204,7 @@ def _rebounds(tape, s, n, rigid, k, count, dt):
 @inner
 def _position_stage(tape, s, n, rigid, k, dt):
     """Before the drift: no gap may close beyond touching."""
+    slop = doubles_at(tape[rigid + NUMBERS])[N_SLOP]
     gather_solids(tape, s, rigid, k)
     place_colliders(tape, s, rigid, k, dt)
     count = find_contacts(tape, s, n, rigid, k, 0.0)
@@ -211,6 +217,12 @@ def _position_stage(tape, s, n, rigid, k, dt):
         gap = s[c + C_GAP]
         # What rests keeps its gap: else impulses would change with its rounding at every step.
         s[c + C_LEAST] = -gap / dt if gap > _AT_REST else 0.0
+        # Friction on what is open follows where it is closed: across the gap it would have a lever that is not there.
+        opened = gap > slop or (gap > _AT_REST and s[c + C_BEFORE] == 0.0)
+        s[c + C_HELD] = 0.0
+        s[c + C_EARLIER] = 0.0 if opened else 1.0
+        if opened:
+            s[c + C_FRICTION] = 0.0
     begin_joints(tape, s, rigid, k, dt, POSITIONS)
     taut = tautness(tape, s, rigid, k, dt)
     solve_islands(tape, s, n, rigid, count, k, ALL)
@@ -218,6 +230,10 @@ def _position_stage(tape, s, n, rigid, k, dt):
     if tape[rigid + JOINTS] > 0:
         closed = close_over_step(tape, s, n, rigid, k, dt, taut)
     scatter_velocities(tape, s, rigid, k)
+    for i in range(count):
+        c = contact_at(tape, rigid, i)
+        if s[c + C_EARLIER] == 0.0:
+            s[c + C_HELD] = s[c + C_IMPULSE]
     _store_contacts(tape, s, n, rigid, k, count)
     store_joints(tape, s, rigid, k, dt, False)
     if not closed:
@@ -238,12 +254,18 @@ def _velocity_stage(tape, s, n, rigid, k, dt):
     for i in range(count):
         c = contact_at(tape, rigid, i)
         closed = s[c + C_GAP] <= _CLOSED or s[c + C_BEFORE] > 0.0
+        if s[c + C_HELD] > 0.0:
+            # Closed within this step: nothing is known yet of what bears it.
+            for axis in range(3):
+                s[c + C_BEFORE + axis] = 0.0
         # What is open does not act: it would have to approach at more than light.
         s[c + C_LEAST] = s[c + C_REBOUND] if closed else -1e30
         deep = deep or s[c + C_GAP] < -slop
     begin_joints(tape, s, rigid, k, dt, VELOCITIES)
     solve_islands(tape, s, n, rigid, count, k, ALL)
     scatter_velocities(tape, s, rigid, k)
+    for i in range(count):
+        s[contact_at(tape, rigid, i) + C_HELD] = 0.0
     _store_contacts(tape, s, n, rigid, k, count)
     store_joints(tape, s, rigid, k, dt, True)
     if deep:

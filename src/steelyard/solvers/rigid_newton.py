@@ -29,6 +29,7 @@ from ..model.rigid_layout import (
     C_COMPLIANCE,
     C_DERIVATIVE,
     C_FRICTION,
+    C_HELD,
     C_IMPULSE,
     C_LEAST,
     C_NORMAL,
@@ -71,7 +72,7 @@ from ..model.rigid_layout import (
     VECTOR_ROW,
 )
 from .block_cholesky import SIX, clear_rows, factorise, solve_factored
-from .friction_cone import project, projection_derivative
+from .friction_cone import project_beyond, projection_derivative
 
 _HALVINGS = 30
 # Share of the tolerance at which no step is taken at all.
@@ -108,7 +109,7 @@ def impulse_at(s, c, u0, u1, u2):
     yn = s[c + C_BEFORE] + (s[c + C_LEAST] - s[c + C_FRICTION] * s[c + C_SHIFT] - u0) * stiffness
     y1 = s[c + C_BEFORE + 1] - u1 * stiffness
     y2 = s[c + C_BEFORE + 2] - u2 * stiffness
-    l0, l1, l2, case, size = project(yn, y1, y2, s[c + C_FRICTION])
+    l0, l1, l2, case, size = project_beyond(yn, y1, y2, s[c + C_FRICTION], s[c + C_HELD])
     return l0, l1, l2, case, size, y1, y2
 
 
@@ -131,7 +132,7 @@ def _evaluate(tape, s, n, rigid, size, contacts, joints):
         s[c + C_IMPULSE] = l0
         s[c + C_IMPULSE + 1] = l1
         s[c + C_IMPULSE + 2] = l2
-        d = projection_derivative(y1, y2, s[c + C_FRICTION], l0, case, reach)
+        d = projection_derivative(y1, y2, s[c + C_FRICTION], l0 + s[c + C_HELD], case, reach)
         at = c + C_DERIVATIVE
         s[at], s[at + 1], s[at + 2], s[at + 3], s[at + 4], s[at + 5] = d
         add_impulse(s, c, a, b, S_PUSH, l0, l1, l2)
@@ -274,7 +275,7 @@ def _assemble(tape, s, h, n, rigid, size, contacts, joints, rows):
     for j in range(contacts):
         contact = n[tape[rigid + LIST] + j]
         c = contact_at(tape, rigid, contact)
-        if s[c + C_DERIVATIVE] != 0.0:
+        if s[c + C_DERIVATIVE] + s[c + C_DERIVATIVE + 3] + s[c + C_DERIVATIVE + 5] != 0.0:
             a = n[tape[rigid + END_A] + contact]
             b = n[tape[rigid + END_B] + contact]
             _stiffness(s, h, c, work + 3)
