@@ -66,7 +66,7 @@ class World:
     # Slots, so that a misspelt assignment is an error and not a new attribute.
     __slots__ = (
         "_choice", "_given", "_given_rows", "_launch", "_method", "_model", "_scene", "_scratch", "_split", "_stale",
-        "_state", "_threads", "_worlds",
+        "_state", "_threads", "_watched", "_worlds",
     )  # fmt: skip
     _model: Model
     _state: np.ndarray
@@ -144,7 +144,7 @@ class World:
         if self._stale:
             self._prepare()
         steps *= self.method.substeps
-        if self._split or self.scene.of(Trigger):
+        if self._split or self._watched:
             for _ in range(steps):
                 self._step_split()
         else:
@@ -177,7 +177,8 @@ class World:
             if share is not None:
                 evaluate_forces(self, share * self.method.substep)
             self._run(1, 1 << part if part < len(shares) - 1 else WHOLE_STEP << part)
-        watch(self)
+        if self._watched:
+            watch(self)
 
     # Access
 
@@ -316,7 +317,7 @@ class World:
         Raises:
             ValueError: the scene has user-written forces or contacts, or triggers, which only ``step`` can call.
         """
-        if self._split or self.scene.of(Trigger):
+        if self._split or self._watched:
             raise ValueError(
                 "World.launch: the scene has user-written forces or contacts, or triggers; use World.step."
             )
@@ -477,6 +478,7 @@ class World:
         self._model = model
         self._state = state
         self._split = bool(self.scene.of(UserForce, ContactGenerator))
+        self._watched = bool(self.scene.of(Trigger))
         count = -(-self.worlds // LANES) if self._split else self.threads
         self._scratch = [new_scratch(model) for _ in range(count)]
         self._stale = True
