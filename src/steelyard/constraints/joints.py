@@ -67,7 +67,7 @@ from .joint_rows import (
     row_at,
     row_velocity,
 )
-from .solids import linearise_turns, solid_at
+from .solids import linearise_turns, rest_solids, solid_at
 
 POSITIONS, VELOCITIES, PUSHES = range(3)
 # Compliance of a row over its mobility.
@@ -343,7 +343,7 @@ def _forget_stiffness(tape, s, rigid):
 def tautness(tape, s, rigid, k, dt):
     """Largest (step times frequency)^2 with which the pulls of joints make a solid swing.
 
-    RATTLE, whose pulls have the directions of the step's start, is stable below 4 (Deuflhard et al.: 2 = h w).
+    RATTLE, whose pulls have the directions of the step's start, is stable below 4, as velocity Verlet is below h w = 2.
     """
     _forget_stiffness(tape, s, rigid)
     for j in range(tape[rigid + JOINTS]):
@@ -380,9 +380,7 @@ def close_joints(tape, s, rigid, k, dt, turn, implicit):
         measure_joint(tape, s, rigid, k, joint, S_END, S_END_ROTATION, what)
         if implicit:
             _stiffen_ends(tape, s, rigid, joint, S_END, dt)
-    for i in range(tape[rigid + SOLIDS]):
-        for c in range(6):
-            s[solid_at(tape, rigid, i) + S_FREE + c] = 0.0
+    rest_solids(tape, s, rigid)
     if implicit:
         linearise_turns(tape, s, rigid, k)
         _turn_impulses(tape, s, rigid)

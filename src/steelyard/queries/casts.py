@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from math import sqrt
 
-from ..collision.hierarchy import HEAD, ROOT, STACK, children, clear_tree, insert_leaf
+from ..collision.hierarchy import HEAD, ROOT, STACK, children, clear_tree, insert_leaf, meets
 from ..collision.manifold import axis
 from ..collision.narrow_phase import ALL_POINTS, POINT, WORK, collide
 from ..kernel import inner, kernel
@@ -341,12 +341,7 @@ def overlap_many(
                 else:
                     waiting -= 1
                     node = stack[waiting]
-                    outside = False
-                    for k in range(3):
-                        outside = (
-                            outside or bounds[node, k] > box[3 + k] or bounds[node, 3 + k] < box[k]
-                        )
-                    if not outside:
+                    if meets(bounds, node, box):
                         if node < n:
                             item = node
                         else:
