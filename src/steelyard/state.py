@@ -11,7 +11,8 @@ import numpy as np
 from .math.pointers import LANES
 from .model.compile import Model
 from .model.derived import LOWER, symmetric
-from .model.parameters import BODIES, PARTICLES, Key
+from .model.parameters import BODIES, PARTICLES, RIGID, Key
+from .model.rigid_layout import REST
 from .scene import checks
 from .scene.body import Body
 from .scene.particle import Particle
@@ -111,6 +112,17 @@ class Group:
     def velocity(self) -> np.ndarray:
         """Velocities [m/s], a writable view of shape (worlds, things, 3)."""
         return self._vector("velocity")
+
+    @property
+    def asleep(self) -> np.ndarray:
+        """What has been at rest for so long that it is not solved until something changes, (worlds, things) bool."""
+        world = self._world
+        if (RIGID, "rest") not in world._model.places:
+            return np.zeros((world._worlds, self._count), dtype=bool)
+        # Bodies stand before particles.
+        first = 0 if self.kind is Body else len(world.scene.bodies)
+        rest = world._view(RIGID, "rest")[:, REST * first : REST * (first + self._count) : REST]
+        return np.asarray(rest < 0.0)
 
     @property
     def inverse_mass(self) -> np.ndarray:
@@ -408,7 +420,8 @@ def carry(old: Model, old_state: np.ndarray, new: Model, state: np.ndarray) -> N
     }
     for key, (row, size) in new.places.items():
         thing, name = key
-        if key not in old.places or name == "mark":
+        # What sleeps wakes: something that it rested on may be gone.
+        if key not in old.places or name in ("mark", "rest"):
             continue
         source = old.places[key][0]
         if thing in groups and name in _EACH:

@@ -22,6 +22,7 @@ from .math.pointers import (
     integers_at,
     tape_at,
 )
+from .model.rigid_layout import CAPACITY, STORED, STORED_ROW, T_ID
 from .model.tape import (
     COUNT,
     FRESH,
@@ -34,6 +35,7 @@ from .model.tape import (
     H_PARTICLES,
     H_POSITION,
     H_RECIPE,
+    H_RIGID,
     H_STATE_ROWS,
     H_TIME,
     H_VELOCITY,
@@ -71,6 +73,20 @@ def _moves(tape, s, row):
 
 
 @inner
+def _unused(tape, s, row):
+    """Rows from this one on that no world of the block uses: those of contacts behind the last that any has."""
+    rigid = tape[H_RIGID]
+    if rigid >= 0:
+        place = row - tape[rigid + STORED_ROW]
+        left = STORED * tape[rigid + CAPACITY] - place
+        if place > 0 and left >= 0 and place % STORED == 0:
+            last = row - STORED + T_ID
+            if not any_lane(load(s, last) > splat(0.0)):
+                return left
+    return 0
+
+
+@inner
 def _load_row(s, row, source, start, picked, whole):
     if whole:
         store(s, row, load_at(source, start + picked[0]))
@@ -82,11 +98,14 @@ def _load_row(s, row, source, start, picked, whole):
 @inner
 def _load_block(tape, s, state, given, given_rows, given_count, width, picked, whole):
     """Copy the state of the picked worlds, and their own parameters, to the scratch."""
-    for row in range(tape[H_STATE_ROWS]):
+    row = 0
+    while row < tape[H_STATE_ROWS]:
         if _moves(tape, s, row):
             _load_row(s, row, state, width * row, picked, whole)
         else:
             store(s, row, splat(0.0))
+        row += 1
+        row += _unused(tape, s, row)
     for index in range(given_count):
         _load_row(s, given_rows[index], given, width * index, picked, whole)
 
@@ -96,21 +115,21 @@ def _store_block(tape, s, state, width, picked, count, whole):
     """Copy the state of the picked worlds back, but of those that are given up."""
     given_up = load(s, tape[H_GIVEN_UP]) > splat(0.5)
     first = picked[0]
-    if whole and not any_lane(given_up):
-        for row in range(tape[H_STATE_ROWS]):
-            if _moves(tape, s, row):
-                store_at(state, width * row + first, load(s, row))
-    elif whole:
-        for row in range(tape[H_STATE_ROWS]):
-            if _moves(tape, s, row):
-                entry = width * row + first
+    every = not any_lane(given_up)
+    row = 0
+    while row < tape[H_STATE_ROWS]:
+        if _moves(tape, s, row):
+            entry = width * row + first
+            if whole and every:
+                store_at(state, entry, load(s, row))
+            elif whole:
                 store_at(state, entry, select(given_up, load_at(state, entry), load(s, row)))
-    else:
-        for k in range(count):
-            if s[tape[H_GIVEN_UP], k] < 0.5:
-                for row in range(tape[H_STATE_ROWS]):
-                    if _moves(tape, s, row):
+            else:
+                for k in range(count):
+                    if s[tape[H_GIVEN_UP], k] < 0.5:
                         state[width * row + picked[k]] = s[row, k]
+        row += 1
+        row += _unused(tape, s, row)
 
 
 @inner

@@ -23,8 +23,9 @@ def on_ground(scene, friction=0.6, restitution=0.0):
 
 
 def settled(scene, seconds=10.0, dt=1 / 60, **more):
-    """A world after so many seconds, and how far anything moved in the last five sixths of them."""
-    world = sy.World(scene, method=sy.Method(sy.Rattle(), sy.ProximalNewton(**more), dt=dt))
+    """A world after so many seconds awake, and how far anything moved in the last five sixths of them."""
+    solver = sy.ProximalNewton(rest_time=None, **more)
+    world = sy.World(scene, method=sy.Method(sy.Rattle(), solver, dt=dt))
     steps = round(seconds / dt)
     world.step(steps // 6)
     before = world.bodies.position.copy()

@@ -9,7 +9,7 @@ one, since a point that serves two lets stacks fall.
 from __future__ import annotations
 
 from ..constraints.contact_rows import contact_vector, length, prepare_rows
-from ..constraints.solids import solid_at
+from ..constraints.solids import is_free, solid_at
 from ..kernel import inner
 from ..math.pointers import LANES, doubles_at
 from ..model.colliders import HALF_SPACE, PLACED, SPHERE
@@ -146,13 +146,13 @@ def _apart(s, kind, a, b, margin):
 
 
 @inner
-def find_contacts(tape, s, n, rigid, k, slack):
-    """Write the contacts of lane k to the work area; how many.
+def find_contacts(tape, s, n, rigid, k, kept):
+    """Write the contacts of lane k, of what is free to move, to the work area; how many.
 
     Args:
-        slack: gap [m] up to which points are kept, beside what both may move within the step.
+        kept: places of the buffer that are taken by what sleeps.
     """
-    capacity = tape[rigid + CAPACITY]
+    capacity = tape[rigid + CAPACITY] - kept
     points = tape[rigid + POINTS_WORK]
     work = tape[rigid + NARROW_WORK]
     placed = tape[rigid + PLACED_WORK]
@@ -167,8 +167,11 @@ def find_contacts(tape, s, n, rigid, k, slack):
         b = placed + PLACED_ENTRIES * second
         kind_a = tape[colliders + COLLIDER * first]
         kind_b = tape[colliders + COLLIDER * second]
-        margin = slack + s[a + _MOVE] + s[b + _MOVE]
-        if not _apart(s, kind_b, a, b, margin):
+        one = tape[colliders + COLLIDER * first + 1]
+        other = _movable(tape, s, rigid, tape[colliders + COLLIDER * second + 1])
+        margin = s[a + _MOVE] + s[b + _MOVE]
+        free = other >= 0 or _movable(tape, s, rigid, one) >= 0
+        if free and not _apart(s, kind_b, a, b, margin):
             found = collide(s, kind_a, a, kind_b, b, points, work, margin)
             for point in range(found):
                 source = points + POINT * point
@@ -183,10 +186,8 @@ def find_contacts(tape, s, n, rigid, k, slack):
                     s[c + C_ID] = IDS * pair + s[source + C_ID]
                     s[c + C_RESTITUTION] = s[LANES * tape[record + 2] + k]
                     s[c + C_FRICTION] = s[LANES * tape[record + 3] + k]
-                    one = tape[colliders + COLLIDER * first + 1]
-                    other = tape[colliders + COLLIDER * second + 1]
                     n[tape[rigid + END_A] + place] = one
-                    n[tape[rigid + END_B] + place] = _movable(tape, s, rigid, other)
+                    n[tape[rigid + END_B] + place] = other
                     if count < capacity:
                         count += 1
         record += PAIR
@@ -198,11 +199,7 @@ def find_contacts(tape, s, n, rigid, k, slack):
 @inner
 def _movable(tape, s, rigid, i):
     """A solid's index, or -1 where nothing moves it."""
-    if i >= 0:
-        solid = solid_at(tape, rigid, i)
-        if s[solid + S_MOVES] == 0.0 and s[solid + S_TURNS] == 0.0:
-            return -1
-    return i
+    return i if i >= 0 and is_free(s, solid_at(tape, rigid, i)) else -1
 
 
 @inner
@@ -248,14 +245,14 @@ def _take(tape, s, n, rigid, k, c, j):
 
 
 @inner
-def match_contacts(tape, s, n, rigid, k, count):
-    """Impulses and rebounds of the stored contacts to those at hand."""
-    old = 0
+def match_contacts(tape, s, n, rigid, k, count, kept):
+    """Impulses and rebounds of the stored contacts, but of those that sleep, to those at hand."""
+    old = kept
     capacity = tape[rigid + CAPACITY]
     while old < capacity and s[_stored(tape, rigid, old, T_ID, k)] > 0.0:
         n[tape[rigid + MATCHED] + old] = 0
         old += 1
-    hint = 0
+    hint = kept
     for i in range(count):
         c = tape[rigid + CONTACT_WORK] + CONTACT_ENTRIES * i
         s[c + C_BEFORE] = 0.0
@@ -265,10 +262,10 @@ def match_contacts(tape, s, n, rigid, k, count):
         s[c + C_HELD] = 0.0
         s[c + C_EARLIER] = 0.0
         wanted = s[c + C_ID] + 1.0
-        for step in range(old):
+        for step in range(old - kept):
             j = hint + step
             if j >= old:
-                j -= old
+                j -= old - kept
             if s[_stored(tape, rigid, j, T_ID, k)] == wanted:
                 _take(tape, s, n, rigid, k, c, j)
                 hint = j + 1
@@ -276,18 +273,18 @@ def match_contacts(tape, s, n, rigid, k, count):
     for i in range(count):
         c = tape[rigid + CONTACT_WORK] + CONTACT_ENTRIES * i
         if s[c + C_EARLIER] == 0.0:
-            _match_nearest(tape, s, n, rigid, k, c, old)
+            _match_nearest(tape, s, n, rigid, k, c, kept, old)
 
 
 @inner
-def _match_nearest(tape, s, n, rigid, k, c, old):
+def _match_nearest(tape, s, n, rigid, k, c, kept, old):
     """Take from the nearest contact of the pair that serves no other."""
     pair = s[c + C_ID] // IDS
     a = tape[rigid + PAIR_RECORDS] + PAIR * int(pair)
     reach = s[tape[rigid + PLACED_WORK] + PLACED_ENTRIES * tape[a] + _REACH]
     least = (_NEAR * reach) ** 2
     nearest = -1
-    for j in range(old):
+    for j in range(kept, old):
         stored = s[_stored(tape, rigid, j, T_ID, k)] - 1.0
         if n[tape[rigid + MATCHED] + j] == 0 and stored // IDS == pair:
             at = _stored(tape, rigid, j, T_PLACE, k)

@@ -14,6 +14,8 @@ from ..math.pointers import LANES
 from ..model.rigid_layout import (
     JOINTS,
     PACK_ROW,
+    REST,
+    REST_ROW,
     S_BASE,
     S_END,
     S_END_ROTATION,
@@ -44,6 +46,18 @@ from ..model.rigid_layout import (
 def solid_at(tape, rigid, i):
     """First entry of a solid's work."""
     return tape[rigid + SOLID_WORK] + SOLID_ENTRIES * i
+
+
+@inner
+def is_free(s, solid):
+    """Whether anything moves a solid: not if it is immovable or asleep."""
+    return s[solid + S_MOVES] != 0.0 or s[solid + S_TURNS] != 0.0
+
+
+@inner
+def rest_at(tape, rigid, i, k):
+    """Entry of how long a solid has been at rest in lane k, of scenes in which things may sleep."""
+    return LANES * (tape[rigid + REST_ROW] + REST * i) + k
 
 
 @inner
@@ -101,16 +115,17 @@ def _turned(s, row, k, rotation, out):
 
 @inner
 def gather_solids(tape, s, rigid, k):
-    """Places, masses, rotations and velocities of lane k."""
+    """Places, masses, rotations and velocities of lane k; what sleeps is gathered as immovable."""
     record = tape[rigid + SOLID_RECORDS]
     at = tape[rigid + SOLID_WORK]
-    for _ in range(tape[rigid + SOLIDS]):
+    for i in range(tape[rigid + SOLIDS]):
         x = tape[record]
         q = tape[record + 1]
         v = tape[record + 2]
         momentum = tape[record + 3]
-        moves = (tape[record + 7] & 1) != 0
-        turns = (tape[record + 7] & 2) != 0
+        awake = tape[rigid + REST_ROW] < 0 or s[rest_at(tape, rigid, i, k)] >= 0.0
+        moves = awake and (tape[record + 7] & 1) != 0
+        turns = awake and (tape[record + 7] & 2) != 0
         for c in range(3):
             s[at + S_PLACE + c] = s[LANES * (x + c) + k]
             s[at + S_FREE + c] = s[LANES * (v + c) + k] if moves else 0.0
@@ -315,11 +330,10 @@ def move_solids(tape, s, rigid, k, dt):
     record = tape[rigid + SOLID_RECORDS]
     for i in range(tape[rigid + SOLIDS]):
         at = solid_at(tape, rigid, i)
-        flags = tape[record + 7]
-        if flags & 1 != 0:
+        if s[at + S_MOVES] != 0.0:
             for c in range(3):
                 s[LANES * (tape[record] + c) + k] += dt * s[at + S_VELOCITY + c]
-        if flags & 2 != 0:
+        if s[at + S_TURNS] != 0.0:
             _turn(s, tape[record + 1], k, dt, at + S_VELOCITY + 3)
         record += SOLID
 

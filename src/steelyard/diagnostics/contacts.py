@@ -55,7 +55,8 @@ def contacts_of(world: World) -> Contacts:
             "that touch something. Use ProximalNewton()."
         )
     stored = world._view(RIGID, "contacts").reshape(world.worlds, -1, STORED)
-    taken = stored[..., T_ID] > 0.0
+    # What lies behind the last is of no meaning.
+    taken = np.logical_and.accumulate(stored[..., T_ID] > 0.0, axis=1)
     pair = np.where(taken, (stored[..., T_ID].astype(np.int64) - 1) // IDS, -1)
     impulse = stored[..., T_IMPULSE : T_IMPULSE + 3].copy()
     return Contacts(

@@ -123,8 +123,12 @@ def turn_freely(s, rotor, turn, momentum, inverse, dt):
     for _ in range(_HALVINGS):
         parts = select(angle > splat(_LONGEST) * parts, parts + parts, parts)
     part = dt / parts
+    # What does not turn stays as it is, to the bit.
+    parts = select(angle > splat(0.0), parts, splat(0.0))
     done = splat(0.0)
     for _ in range(1 << _HALVINGS):
+        if not any_lane(done < parts):
+            break
         f, w, x, y, z = load_turn(s, turn)
         mx, my, mz = rotate_back(f, w, x, y, z, lx, ly, lz)
         store_vector(s, rotor, mx, my, mz)
@@ -138,8 +142,6 @@ def turn_freely(s, rotor, turn, momentum, inverse, dt):
             row = rotor + 6 + k
             store(s, turn + k, select(done < parts, load(s, turn + k), load(s, row)))
         done = done + one
-        if not any_lane(done < parts):
-            break
 
 
 @inner

@@ -29,7 +29,7 @@ _POINTS = {SPHERE: 1, CAPSULE: 2}
 _USUAL = 16
 
 
-_SECTIONS = ("solids", "colliders", "pairs", "joints")
+_SECTIONS = ("solids", "colliders", "pairs", "joints", "wakers")
 
 
 def _rows(joint: Any) -> int:
@@ -104,6 +104,8 @@ class Rigid:
             c.state((joint, "torque"), np.zeros(3))
             for prefix, drive in named_drives(joint):
                 c.state((joint, f"{prefix}speed"), [drive.speed])
+        if getattr(c.method.solver, "rest_time", None) is not None:
+            c.state((RIGID, "rest"), np.zeros(at.REST * len(self._things) + 1))
 
     def build(self) -> None:
         """Records, numbers and work rows."""
@@ -133,9 +135,37 @@ class Rigid:
         for joint in self.joints:
             joints += self._joint(joint, first, index)
             first += _rows(joint)
-        for name, records in zip(_SECTIONS, (solids, colliders, pairs, joints), strict=True):
+        wakers = self._wakers(solids, pairs, colliders, joints)
+        for name, records in zip(
+            _SECTIONS, (solids, colliders, pairs, joints, wakers), strict=True
+        ):
             c.sections[name] = records
-        self._record(len(things))
+        self._record(len(things), len(wakers))
+
+    def _wakers(
+        self, solids: list[int], pairs: list[int], colliders: list[int], joints: list[int]
+    ) -> list[int]:
+        """Rows of what all solids share, and of masses: what sleeps wakes if one of them changes."""
+        rows: list[int] = []
+        for k in range(0, len(solids), at.SOLID):
+            place, turn, _, _, mass, *_, flags, _ = solids[k : k + at.SOLID]
+            if flags != 0:
+                rows.append(mass)
+            else:
+                rows += [*range(place, place + 3), *(range(turn, turn + 4) if turn >= 0 else ())]
+        for k in range(0, len(pairs), at.PAIR):
+            rows += pairs[k + 2 : k + 4]
+        for k in range(0, len(colliders), at.COLLIDER):
+            kind, row = colliders[k], colliders[k + 3]
+            rows += range(row, row + (4 if kind == HALF_SPACE else row >= 0))
+        for k in range(0, len(joints), at.JOINT):
+            # But of the reaction, which is read only.
+            joint = joints[k : k + at.JOINT]
+            rows += [joint[at.JOINT_BROKEN], *joint[at.JOINT_TORN : at.JOINT_DRIVES]]
+            for drive in range(joint[at.JOINT_DRIVES]):
+                first = at.DRIVES_AT + at.DRIVE * drive
+                rows += joint[first + 1 : first + at.DRIVE]
+        return sorted({row for row in rows if row >= 0})
 
     def _solid(self, thing: Body | Particle) -> list[int]:
         """Record of what contacts push."""
@@ -216,7 +246,7 @@ class Rigid:
             ]
         return record + [-1] * (at.JOINT - len(record))
 
-    def _record(self, solids: int) -> None:
+    def _record(self, solids: int, wakers: int) -> None:
         """The record that holds it all together."""
         c = self._c
         capacity = self.capacity
@@ -234,6 +264,8 @@ class Rigid:
         words[at.CAPACITY] = capacity
         words[at.START_ROW] = c.take(6 * solids)
         words[at.JOINTS] = len(self.joints)
+        words[at.REST_ROW] = c.model.places.get((RIGID, "rest"), (-1, 0))[0]
+        words[at.WAKERS] = wakers
         words[at.BOUND_ROW] = c.model.places[RIGID, "bound"][0]
         words[at.ROW_WORK] = entries(at.ROW_ENTRIES * sum(map(_rows, self.joints)))
         words[at.FRAME_WORK] = entries(at.FRAME_ENTRIES)

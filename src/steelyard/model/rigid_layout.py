@@ -11,9 +11,9 @@ from __future__ import annotations
 (
     SOLIDS, SOLID_RECORDS, COLLIDERS, COLLIDER_RECORDS, PAIRS, PAIR_RECORDS, NUMBERS, STORED_ROW, CAPACITY,
     OVERFLOW_ROW, START_ROW, SOLID_WORK, PLACED_WORK, CONTACT_WORK, POINTS_WORK, NARROW_WORK, MATRIX_ROW, VECTOR_ROW,
-    JOINTS, JOINT_RECORDS, ROW_WORK, FRAME_WORK, BOUND_ROW, PACK_ROW,
+    JOINTS, JOINT_RECORDS, ROW_WORK, FRAME_WORK, BOUND_ROW, PACK_ROW, REST_ROW, WAKERS, WAKER_RECORDS,
     DEGREES, ADJACENT, ORDER, LOCAL, FIRST, STARTS, END_A, END_B, LIST, MATCHED, HELD, RIGID_WORDS,
-) = range(36)  # fmt: skip
+) = range(39)  # fmt: skip
 
 # Record of a solid (body or particle): rows of position, orientation, velocity, angular momentum, inverse mass, inertia
 # and its inverse, -1 where it has none; whether it moves (1) and turns (2); rows of its constant acceleration.
@@ -32,8 +32,9 @@ JOINT_BROKEN, JOINT_TORN, JOINT_LENGTH, JOINT_DRIVES, DRIVES_AT = 6, 9, 11, 12, 
 # Settings, first of the numbers; then of every collider the place in its solid (3), turn (9), sizes (3), and the radius
 # of a ball about its centre that holds it.
 (
-    N_COMPLIANCE, N_TOLERANCE, N_IMPULSE, N_SHIFT, N_SLOP, N_PASSES, N_ITERATIONS, SETTINGS,
-) = range(8)  # fmt: skip
+    N_COMPLIANCE, N_TOLERANCE, N_IMPULSE, N_SHIFT, N_SLOP, N_PASSES, N_ITERATIONS, N_REST_SPEED, N_REST_TIME,
+    SETTINGS,
+) = range(10)  # fmt: skip
 GEOMETRY = 16
 G_PLACE, G_TURN, G_SIZE, G_REACH = 0, 3, 12, 15
 
@@ -98,3 +99,7 @@ OFF, EQUAL, LIMIT, MOTOR, SPRING = 0.0, 1.0, 2.0, 3.0, 4.0
 # impulse of the position stage on what was open, on which the velocity stage has friction.
 STORED = 9
 T_ID, T_IMPULSE, T_PLACE, T_REBOUND, T_HELD = 0, 1, 4, 7, 8
+
+# Rows of the state per solid that may sleep (``solvers.sleep``), and behind them all one more, of what they share.
+REST = 3
+REST_KICK, REST_POSE = 1, 2

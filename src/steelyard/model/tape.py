@@ -120,9 +120,10 @@ from __future__ import annotations
     H_COLLIDERS,
     H_PAIRS,
     H_JOINTS,
+    H_WAKERS,
     H_RIGID,
-) = range(112)
-HEADER = 112
+) = range(113)
+HEADER = 113
 
 # Width of the records of links, contacts and springs that a solver holds; written field by field.
 LINK = 17

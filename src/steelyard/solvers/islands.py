@@ -6,6 +6,8 @@ Solids are visited breadth first from one end of the island, which a first visit
 
 from __future__ import annotations
 
+from ..constraints.joint_rows import joint_at, joint_solids
+from ..constraints.solids import is_free
 from ..kernel import inner
 from ..model.rigid_layout import (
     ADJACENT,
@@ -14,6 +16,7 @@ from ..model.rigid_layout import (
     END_B,
     FIRST,
     HELD,
+    JOINTS,
     LIST,
     LOCAL,
     ORDER,
@@ -22,11 +25,27 @@ from ..model.rigid_layout import (
 )
 from .block_cholesky import SIX
 
-_UNSEEN, _SEEN, _DONE = -1, -2, -3
+#: Of what no visit has come to.
+UNSEEN = -1
+_SEEN, _DONE = -2, -3
 
 
 @inner
-def join(tape, n, rigid, count):
+def join_all(tape, s, n, rigid, count):
+    """Bonds by so many contacts and by all joints, of what is free to move."""
+    for j in range(tape[rigid + JOINTS]):
+        joint = joint_at(tape, rigid, j)
+        a, b = joint_solids(tape, rigid, joint)
+        one = tape[joint + 1] if is_free(s, a) else -1
+        other = tape[joint + 2] if is_free(s, b) else -1
+        # The first end of a bond can move.
+        n[tape[rigid + END_A] + count + j] = one if one >= 0 else other
+        n[tape[rigid + END_B] + count + j] = other if one >= 0 else -1
+    _join(tape, n, rigid, count + tape[rigid + JOINTS])
+
+
+@inner
+def _join(tape, n, rigid, count):
     """Bonds of every solid, contacts and then joints, as lists one behind the other; no solid has an island yet."""
     solids = tape[rigid + SOLIDS]
     degrees = tape[rigid + DEGREES]
@@ -34,7 +53,7 @@ def join(tape, n, rigid, count):
     for i in range(solids + 1):
         n[degrees + i] = 0
     for i in range(solids):
-        n[tape[rigid + LOCAL] + i] = _UNSEEN
+        n[tape[rigid + LOCAL] + i] = UNSEEN
     for end in range(2):
         ends = tape[rigid + (END_A if end == 0 else END_B)]
         for i in range(count):
@@ -59,7 +78,7 @@ def join(tape, n, rigid, count):
 
 
 @inner
-def _visit(tape, n, rigid, seed, mark):
+def visit(tape, n, rigid, seed, mark):
     """Solids of the seed's island breadth first, into the order; how many. ``mark``: what they are marked with."""
     order = tape[rigid + ORDER]
     local = tape[rigid + LOCAL]
@@ -96,8 +115,8 @@ def gather_island(tape, n, rigid, seed, count):
     local = tape[rigid + LOCAL]
     degrees = tape[rigid + DEGREES]
     first = tape[rigid + FIRST]
-    size = _visit(tape, n, rigid, seed, _SEEN)
-    size = _visit(tape, n, rigid, n[order + size - 1], _DONE)
+    size = visit(tape, n, rigid, seed, _SEEN)
+    size = visit(tape, n, rigid, n[order + size - 1], _DONE)
     for i in range(size // 2):
         other = n[order + size - 1 - i]
         n[order + size - 1 - i] = n[order + i]

@@ -73,6 +73,7 @@ from ..model.rigid_layout import (
     STORED,
     STORED_ROW,
     T_HELD,
+    T_ID,
     T_IMPULSE,
     T_PLACE,
     T_REBOUND,
@@ -84,6 +85,14 @@ from .base import Solver
 from .joint_closing import close_over_step, join_again
 from .rigid_islands import ALL, PUSH, solve_islands
 from .rigid_newton import contact_at, contact_ends
+from .sleep import (
+    all_asleep,
+    fall_asleep,
+    hold_sleepers,
+    keep_sleeping_contacts,
+    wake_changed,
+    wake_touched,
+)
 
 # Share of a penetration that one step takes away, and the fastest push [m/s].
 _SHARE, _FASTEST = 0.2, 3.0
@@ -104,6 +113,9 @@ class ProximalNewton(Solver):
         slop: penetration [m] that is left alone.
         contacts: most contacts of a world; by the number of its pairs by default. What is beyond sets a flag in
             ``world.health``, and the deepest are kept.
+        rest_speed: what is slower [m/s and rad/s] is at rest.
+        rest_time: for how long [s] all of an island must be at rest before it sleeps; None where nothing shall. What
+            sleeps is where it would be awake within ``rest_speed`` times the time asleep, and wakes by itself.
     """
 
     tolerance: float = 1e-9
@@ -111,6 +123,8 @@ class ProximalNewton(Solver):
     iterations: int = 60
     slop: float = 1e-4
     contacts: int | None = None
+    rest_speed: float = 1e-6
+    rest_time: float | None = 0.5
     staged: ClassVar[bool] = True
     rigid: ClassVar[bool] = True
 
@@ -125,11 +139,19 @@ class ProximalNewton(Solver):
             checks.whole(
                 "ProximalNewton", "contacts", self.contacts, least=1, remedy="Leave it out."
             )
+        above = checks.Limit(above=0.0, remedy="Use 1e-6 for a micrometre per second.")
+        checks.number("ProximalNewton", "rest_speed", self.rest_speed, above)
+        if self.rest_time is not None:
+            limit = checks.Limit(least=0.0, remedy="Use 0.5, or None where nothing shall sleep.")
+            checks.number("ProximalNewton", "rest_time", self.rest_time, limit)
 
     @property
     def settings(self) -> tuple[float, ...]:
         """Numbers in the order of the layout."""
-        return (1e-5, self.tolerance, 1e-9, 1e-4, self.slop, self.passes, self.iterations)
+        rest = self.rest_time if self.rest_time is not None else 0.0
+        return (
+            1e-5, self.tolerance, 1e-9, 1e-4, self.slop, self.passes, self.iterations, self.rest_speed, rest
+        )  # fmt: skip
 
     @property
     def start(self) -> Stage:
@@ -143,10 +165,10 @@ class ProximalNewton(Solver):
 
 
 @inner
-def _store_contacts(tape, s, n, rigid, k, count):
-    """Ids, impulses, places and rebounds of the contacts at hand, for the next stage."""
-    for j in range(tape[rigid + CAPACITY]):
-        at = LANES * (tape[rigid + STORED_ROW] + STORED * j) + k
+def _store_contacts(tape, s, n, rigid, k, count, kept):
+    """Ids, impulses, places and rebounds of the contacts at hand, for the next stage, behind those that are kept."""
+    for j in range(tape[rigid + CAPACITY] - kept):
+        at = LANES * (tape[rigid + STORED_ROW] + STORED * (kept + j)) + k
         if j < count:
             c = contact_at(tape, rigid, j)
             s[at] = s[c + C_ID] + 1.0
@@ -161,10 +183,9 @@ def _store_contacts(tape, s, n, rigid, k, count):
             s[at + LANES * T_REBOUND] = s[c + C_REBOUND]
             s[at + LANES * T_HELD] = s[c + C_HELD]
         else:
-            if s[at] == 0.0:
-                break
-            for field in range(STORED):
-                s[at + LANES * field] = 0.0
+            # What lies behind the last is not looked at.
+            s[at + LANES * T_ID] = 0.0
+            break
 
 
 @inner
@@ -202,14 +223,32 @@ def _rebounds(tape, s, n, rigid, k, count, dt):
 
 
 @inner
+def _contacts_at_hand(tape, s, n, rigid, k, dt):
+    """Solids and contacts of lane k in the work area, with what is known of them from the last stage.
+
+    Returns:
+        How many contacts there are, and how many of the stored ones are kept for what sleeps.
+    """
+    count = 0
+    kept = 0
+    while True:
+        gather_solids(tape, s, rigid, k)
+        kept = keep_sleeping_contacts(tape, s, rigid, k)
+        place_colliders(tape, s, rigid, k, dt)
+        count = find_contacts(tape, s, n, rigid, k, kept)
+        if not wake_touched(tape, s, rigid, k, count):
+            break
+    hold_sleepers(tape, s, rigid, k)
+    prepare_contacts(tape, s, n, rigid, count)
+    match_contacts(tape, s, n, rigid, k, count, kept)
+    return count, kept
+
+
+@inner
 def _position_stage(tape, s, n, rigid, k, dt):
     """Before the drift: no gap may close beyond touching."""
     slop = doubles_at(tape[rigid + NUMBERS])[N_SLOP]
-    gather_solids(tape, s, rigid, k)
-    place_colliders(tape, s, rigid, k, dt)
-    count = find_contacts(tape, s, n, rigid, k, 0.0)
-    prepare_contacts(tape, s, n, rigid, count)
-    match_contacts(tape, s, n, rigid, k, count)
+    count, kept = _contacts_at_hand(tape, s, n, rigid, k, dt)
     if tape[rigid + START_ROW] >= 0:
         _rebounds(tape, s, n, rigid, k, count, dt)
     for i in range(count):
@@ -234,7 +273,7 @@ def _position_stage(tape, s, n, rigid, k, dt):
         c = contact_at(tape, rigid, i)
         if s[c + C_EARLIER] == 0.0:
             s[c + C_HELD] = s[c + C_IMPULSE]
-    _store_contacts(tape, s, n, rigid, k, count)
+    _store_contacts(tape, s, n, rigid, k, count, kept)
     store_joints(tape, s, rigid, k, dt, False)
     if not closed:
         join_again(tape, s, n, rigid, k, dt)
@@ -245,11 +284,7 @@ def _velocity_stage(tape, s, n, rigid, k, dt):
     """After the last kick: surfaces that touch do not approach; then overlaps are pushed apart."""
     numbers = doubles_at(tape[rigid + NUMBERS])
     slop = numbers[N_SLOP]
-    gather_solids(tape, s, rigid, k)
-    place_colliders(tape, s, rigid, k, dt)
-    count = find_contacts(tape, s, n, rigid, k, 0.0)
-    prepare_contacts(tape, s, n, rigid, count)
-    match_contacts(tape, s, n, rigid, k, count)
+    count, kept = _contacts_at_hand(tape, s, n, rigid, k, dt)
     deep = False
     for i in range(count):
         c = contact_at(tape, rigid, i)
@@ -266,8 +301,9 @@ def _velocity_stage(tape, s, n, rigid, k, dt):
     scatter_velocities(tape, s, rigid, k)
     for i in range(count):
         s[contact_at(tape, rigid, i) + C_HELD] = 0.0
-    _store_contacts(tape, s, n, rigid, k, count)
+    _store_contacts(tape, s, n, rigid, k, count, kept)
     store_joints(tape, s, rigid, k, dt, True)
+    fall_asleep(tape, s, n, rigid, k, count, dt)
     if deep:
         _push_apart(tape, s, n, rigid, k, count, dt, slop)
 
@@ -309,6 +345,11 @@ def proximal_newton_stage(tape, s, skip, half):
     dt = s[LANES * tape[H_DT]]
     for k in range(skip[tape[H_BLOCKS] + COUNT]):
         if half == 0:
-            _position_stage(tape, s, skip, rigid, k, dt)
+            if wake_changed(tape, s, rigid, k):
+                _position_stage(tape, s, skip, rigid, k, dt)
+            else:
+                hold_sleepers(tape, s, rigid, k)
+        elif all_asleep(tape, s, rigid, k):
+            hold_sleepers(tape, s, rigid, k)
         else:
             _velocity_stage(tape, s, skip, rigid, k, dt)

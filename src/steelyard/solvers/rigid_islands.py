@@ -13,7 +13,7 @@ from ..constraints.joint_rows import (
     row_impulse,
     row_velocity,
 )
-from ..constraints.solids import solid_at, symmetric_times
+from ..constraints.solids import is_free, solid_at, symmetric_times
 from ..kernel import inner
 from ..math.pointers import LANES, doubles_at
 from ..model.rigid_layout import (
@@ -24,15 +24,12 @@ from ..model.rigid_layout import (
     C_SHIFT,
     C_SPEED,
     C_WEIGHT,
-    END_A,
-    END_B,
     HELD,
     J_BEFORE,
     J_COMPLIANCE,
     J_IMPULSE,
     J_KIND,
     J_OFFSET,
-    JOINTS,
     LIST,
     LOCAL,
     N_COMPLIANCE,
@@ -47,17 +44,15 @@ from ..model.rigid_layout import (
     ROW_ENTRIES,
     S_FREE,
     S_GEOMETRIC,
-    S_MOVES,
     S_PUSH,
-    S_TURNS,
     S_VELOCITY,
     SOLIDS,
     SPRING,
 )
 from ..model.tape import H_UNSETTLED
 from .block_cholesky import SIX
-from .islands import gather_island, join
-from .rigid_newton import contact_at, contact_ends, impulse_at, is_free, minimise
+from .islands import UNSEEN, gather_island, join_all
+from .rigid_newton import contact_at, contact_ends, impulse_at, minimise
 
 # Compliance of the fallback, which is solved once, and of the push, over the mobility of a contact.
 _SOFT, _PUSH = 1e-4, 1e-3
@@ -297,23 +292,13 @@ def solve_islands(tape, s, n, rigid, count, k, what):
         what: ALL impulses; CHANGES of those of joints, one pass of which more follow; or a PUSH, which ends with
             velocities.
     """
-    for j in range(tape[rigid + JOINTS]):
-        joint = joint_at(tape, rigid, j)
-        a, b = joint_solids(tape, rigid, joint)
-        one = tape[joint + 1] if is_free(s, a) else -1
-        other = tape[joint + 2] if is_free(s, b) else -1
-        # The first end of a bond can move.
-        n[tape[rigid + END_A] + count + j] = one if one >= 0 else other
-        n[tape[rigid + END_B] + count + j] = other if one >= 0 else -1
-    join(tape, n, rigid, count + tape[rigid + JOINTS])
+    join_all(tape, s, n, rigid, count)
     for seed in range(tape[rigid + SOLIDS]):
         at = solid_at(tape, rigid, seed)
-        local = n[tape[rigid + LOCAL] + seed]
-        fixed = s[at + S_MOVES] == 0.0 and s[at + S_TURNS] == 0.0
-        if fixed:
+        if not is_free(s, at):
             for c in range(SIX):
                 s[at + S_VELOCITY + c] = 0.0
-        elif local < 0:
+        elif n[tape[rigid + LOCAL] + seed] == UNSEEN:
             size, contacts, joints, rows = gather_island(tape, n, rigid, seed, count)
             good = True
             if what == PUSH:

@@ -16,7 +16,7 @@ from ..constraints.joint_rows import (
     row_impulse,
     row_velocity,
 )
-from ..constraints.solids import solid_at, symmetric_times
+from ..constraints.solids import is_free, solid_at, symmetric_times
 from ..kernel import inner
 from ..math.lanes import fma, load, splat, store
 from ..math.pointers import LANES, offset
@@ -94,12 +94,6 @@ def contact_ends(tape, n, rigid, i):
     b = n[tape[rigid + END_B] + i]
     a = solid_at(tape, rigid, n[tape[rigid + END_A] + i])
     return a, solid_at(tape, rigid, b) if b >= 0 else -1
-
-
-@inner
-def is_free(s, solid):
-    """Whether anything moves a solid."""
-    return s[solid + S_MOVES] != 0.0 or s[solid + S_TURNS] != 0.0
 
 
 @inner
