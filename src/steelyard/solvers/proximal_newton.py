@@ -40,8 +40,6 @@ from ..constraints.solids import (
     pay_for_lifts,
     rest_solids,
     scatter_velocities,
-    solid_at,
-    symmetric_times,
 )
 from ..kernel import inner
 from ..math.lanes import load, splat, store
@@ -64,8 +62,6 @@ from ..model.rigid_layout import (
     NUMBERS,
     S_FREE,
     S_GRADIENT,
-    S_INVERSE_INERTIA,
-    S_MOVES,
     SOLID,
     SOLID_RECORDS,
     SOLIDS,
@@ -82,6 +78,7 @@ from ..model.tape import COUNT, H_BLOCKS, H_DT, H_RIGID
 from ..scene import checks
 from ..stage import Stage, stage
 from .base import Solver
+from .blows import pass_blows, start_velocities
 from .joint_closing import close_over_step, join_again
 from .rigid_islands import ALL, PUSH, solve_islands
 from .rigid_newton import contact_at, contact_ends
@@ -195,20 +192,7 @@ def _rebounds(tape, s, n, rigid, k, count, dt):
     Under the normal acceleration a of free motion the surfaces meet at the square of their speed at the start minus
     2 a gap: so energy is what restitution says, whatever the step.
     """
-    record = tape[rigid + SOLID_RECORDS]
-    start = tape[rigid + START_ROW]
-    for i in range(tape[rigid + SOLIDS]):
-        at = solid_at(tape, rigid, i)
-        for c in range(3):
-            s[at + S_GRADIENT + c] = s[LANES * (start + 6 * i + c) + k] * s[at + S_MOVES]
-        a, b, c = symmetric_times(
-            s, at + S_INVERSE_INERTIA, s[LANES * (start + 6 * i + 3) + k], s[LANES * (start + 6 * i + 4) + k],
-            s[LANES * (start + 6 * i + 5) + k],
-        )  # fmt: skip
-        s[at + S_GRADIENT + 3] = a
-        s[at + S_GRADIENT + 4] = b
-        s[at + S_GRADIENT + 5] = c
-        record += SOLID
+    start_velocities(tape, s, rigid, k)
     for i in range(count):
         c = contact_at(tape, rigid, i)
         s[c + C_REBOUND] = 0.0
@@ -296,6 +280,7 @@ def _velocity_stage(tape, s, n, rigid, k, dt):
         # What is open does not act: it would have to approach at more than light.
         s[c + C_LEAST] = s[c + C_REBOUND] if closed else -1e30
         deep = deep or s[c + C_GAP] < -slop
+    pass_blows(tape, s, n, rigid, k, count)
     begin_joints(tape, s, rigid, k, dt, VELOCITIES)
     solve_islands(tape, s, n, rigid, count, k, ALL)
     scatter_velocities(tape, s, rigid, k)
