@@ -290,6 +290,47 @@ def test_a_tumbling_heap_settles_without_a_failed_solve(seed):
     assert world.bodies.position[0, :, 1].min() > 0.19
 
 
+def test_a_thin_plate_that_falls_flat_lands_flat():
+    """All eight of its corners are near the ground within a step: the lower ones must be those that count."""
+    scene = sy.Scene()
+    scene.add(sy.Body(position=(0, 1.0, 0), parts=sy.Box((0.5, 0.01, 0.3))))
+    scene.add(sy.Ground(friction=0.5))
+    world = sy.World(scene)
+    for _ in range(60):
+        world.step()
+        assert world.penetration[0] < 1e-9
+        assert np.abs(world.bodies.angular_velocity).max() < 1e-9
+    assert world.bodies.position[0, 0, 1] == pytest.approx(0.01, abs=1e-9)
+
+
+@pytest.mark.parametrize(("dt", "gain"), [(1 / 240, 3e-5), (1 / 1000, 2e-6)])
+@pytest.mark.parametrize("friction", [2.0, 4.0, 10.0])
+@pytest.mark.parametrize("slope", [0.3, 0.9, 1.3])
+@pytest.mark.parametrize("speed", [-4.0, 4.0])
+def test_a_rod_that_jams_gains_nothing(dt, gain, friction, slope, speed):
+    """Painleve's rod: beyond mu = 4/3 sliding has no solution with finite forces."""
+    scene = sy.Scene()
+    turn = (math.cos(slope / 2), 0, 0, math.sin(slope / 2))
+    height = 0.02 + 0.5 * math.sin(slope)
+    scene.add(
+        sy.Body(
+            position=(0, height, 0),
+            velocity=(speed, 0, 0),
+            orientation=turn,
+            parts=sy.Box((0.5, 0.02, 0.02)),
+        )
+    )
+    scene.add(sy.Ground(friction=friction))
+    world = sy.World(scene, method=sy.Method(sy.Rattle(), sy.ProximalNewton(), dt=dt))
+    energies = [world.energy[0]]
+    for _ in range(round(1.0 / dt)):
+        world.step()
+        energies.append(world.energy[0])
+    assert np.isfinite(energies).all()
+    assert world.health[0] == 0
+    assert np.diff(energies).max() < gain * (energies[0] - min(energies))
+
+
 def test_deep_overlaps_part_without_a_burst():
     scene = sy.Scene()
     box(scene, 0, 0.5)

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from ..kernel import inner
 from ..model.colliders import SIZE
-from .manifold import axis, outward, put_point, reduce_points
+from .manifold import axis, local, outward, put_point
+
+# Rounding decides nothing: of faces that look alike the first is taken.
+_TIE = 1e-9
 
 
 @inner
@@ -49,10 +52,22 @@ def capsule_half_space(m, a, b, out, margin):
 
 @inner
 def box_half_space(m, a, b, out, margin):
-    """Up to four of the corners."""
+    """Corners of the face that looks at the plane: what lies above these would take their place in a thin box."""
     nx, ny, nz = axis(m, b, 1)
+    lx, ly, lz = local(m, a, nx, ny, nz)
+    most = lx
+    face = 1
+    if abs(ly) > abs(most) + _TIE:
+        most = ly
+        face = 2
+    if abs(lz) > abs(most) + _TIE:
+        most = lz
+        face = 4
+    wanted = 0 if most > 0.0 else face
     count = 0
     for corner in range(8):
+        if corner & face != wanted:
+            continue
         x, y, z = outward(
             m, a,
             m[a + SIZE] if corner & 1 else -m[a + SIZE],
@@ -66,4 +81,4 @@ def box_half_space(m, a, b, out, margin):
         if gap <= margin:
             put_point(m, out, count, nx, ny, nz, gap, x, y, z, float(corner))
             count += 1
-    return reduce_points(m, out, count)
+    return count

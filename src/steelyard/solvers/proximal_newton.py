@@ -92,7 +92,7 @@ from .sleep import (
 )
 
 # Share of a penetration that one step takes away, and the fastest push [m/s].
-_SHARE, _FASTEST = 0.2, 3.0
+_SHARE, _FASTEST = 1.0, 3.0
 # A gap [m] at which a contact that carried nothing is closed all the same.
 _CLOSED = 1e-10
 # A gap [m] that nothing closes.
