@@ -60,6 +60,7 @@ from .scene.triggers import Trigger
 from .solvers.direct import Direct
 from .solvers.gauss_seidel import GaussSeidel
 from .solvers.proximal_newton import ProximalNewton
+from .solvers.soft_step import SoftStep
 from .solvers.worst_first import WorstFirst
 from .solvers.xpbd import Xpbd
 from .stepping import advance
@@ -119,6 +120,7 @@ __all__ = [
     "RungeKutta4",
     "Scene",
     "SliderJoint",
+    "SoftStep",
     "Sphere",
     "Spring",
     "StiffSpring",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from .integrators.base import Integrator
 from .integrators.closed_form import ClosedForm
@@ -22,6 +22,7 @@ from .solvers.base import Solver
 from .solvers.direct import Direct
 from .solvers.gauss_seidel import GaussSeidel
 from .solvers.proximal_newton import ProximalNewton
+from .solvers.soft_step import SoftStep
 from .solvers.worst_first import WorstFirst
 from .solvers.xpbd import Xpbd
 
@@ -72,12 +73,22 @@ class Method:
         """What the stages take for a step [s]: dt over ``substeps``."""
         return self.dt / self.substeps
 
+    def for_scene(self, scene: Scene) -> Method:
+        """The method as a scene needs it: where bodies touch or are joined, with the solver's form for these."""
+        if self.solver is None or not _joined_or_touching(scene):
+            return self
+        return replace(self, solver=self.solver.for_bodies)
+
     def refuse(self, scene: Scene) -> None:
         """Raise if this method cannot do what a scene holds.
 
         Raises:
             ValueError: names the method, the thing and the remedy.
         """
+        fitting = self.for_scene(scene)
+        if fitting is not self and fitting != self:
+            fitting.refuse(scene)
+            return
         name = type(self.integrator).__name__
         held = scene.of(*LINKS, *CONTACTS, Rider)
         if scene.bodies and not self.integrator.moves_bodies:
@@ -246,10 +257,15 @@ DEFAULT = Method(Rattle(), Direct())
 DEFAULT_RIGID = Method(Rattle(), ProximalNewton())
 
 
+def _joined_or_touching(scene: Scene) -> bool:
+    """Whether there are joints, or bodies that touch something."""
+    touching = any(scene.bodies_at(contact) for contact in scene.of(Ground, Collisions))
+    return touching or bool(scene.of(*JOINTS))
+
+
 def default_for(scene: Scene) -> Method:
     """The method of a world that is given none."""
-    touching = any(scene.bodies_at(contact) for contact in scene.of(Ground, Collisions))
-    return DEFAULT_RIGID if touching or scene.of(*JOINTS) else DEFAULT
+    return DEFAULT_RIGID if _joined_or_touching(scene) else DEFAULT
 
 
 __all__ = [
@@ -262,6 +278,7 @@ __all__ = [
     "ProximalNewton",
     "Rattle",
     "RungeKutta4",
+    "SoftStep",
     "SymplecticEuler",
     "WorstFirst",
     "Xpbd",

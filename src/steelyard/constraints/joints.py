@@ -248,6 +248,19 @@ def _stiffen_ends(tape, s, rigid, joint, place, dt):
 
 
 @inner
+def soften_joints(tape, s, rigid, rate, share):
+    """Let what is locked give way: errors fall at a rate [1/s], with a compliance over the mobility."""
+    for j in range(tape[rigid + JOINTS]):
+        joint = joint_at(tape, rigid, j)
+        row = row_at(tape, rigid, tape[joint + 4])
+        for _ in range(tape[joint + 5]):
+            if s[row + J_KIND] == EQUAL:
+                s[row + J_LEAST] = -rate * s[row + J_ERROR]
+                s[row + J_COMPLIANCE] = share * s[row + J_WEIGHT]
+            row += ROW_ENTRIES
+
+
+@inner
 def hold_impulses(tape, s, rigid, factor):
     """Put the impulses at hand into the base, so that rows count changes from there.
 

@@ -64,5 +64,5 @@ def contacts_of(world: World) -> Contacts:
         pair=pair,
         place=stored[..., T_PLACE : T_PLACE + 3].copy(),
         impulse=impulse,
-        force=impulse / (0.5 * world.method.dt),
+        force=impulse / (0.5 * world.method.substep),
     )

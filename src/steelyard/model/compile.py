@@ -536,4 +536,5 @@ def compile_model(scene: Scene, method: Method) -> Model:
         ValueError: the method cannot do what the scene holds.
     """
     method.refuse(scene)
+    method = method.for_scene(scene)
     return Compiler(scene.copy(), method).compile()

@@ -33,8 +33,8 @@ JOINT_BROKEN, JOINT_TORN, JOINT_LENGTH, JOINT_DRIVES, DRIVES_AT = 6, 9, 11, 12, 
 # of a ball about its centre that holds it.
 (
     N_COMPLIANCE, N_TOLERANCE, N_IMPULSE, N_SHIFT, N_SLOP, N_PASSES, N_ITERATIONS, N_REST_SPEED, N_REST_TIME,
-    SETTINGS,
-) = range(10)  # fmt: skip
+    N_SWEEPS, N_WORST, N_HERTZ, N_RATIO, SETTINGS,
+) = range(14)  # fmt: skip
 GEOMETRY = 16
 G_PLACE, G_TURN, G_SIZE, G_REACH = 0, 3, 12, 15
 

@@ -23,6 +23,11 @@ class Solver:
     rigid: ClassVar[bool] = False
 
     @property
+    def for_bodies(self) -> Solver:
+        """The same method where bodies touch or are joined; itself, if it has no other form there."""
+        return self
+
+    @property
     def start(self) -> Stage:
         """Of a rigid solver: what it notes before the first kick."""
         raise NotImplementedError

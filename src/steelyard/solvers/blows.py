@@ -33,7 +33,6 @@ from ..model.rigid_layout import (
     END_A,
     END_B,
     S_GRADIENT,
-    S_INVERSE,
     S_INVERSE_INERTIA,
     S_MOVES,
     S_PUSH,
@@ -41,6 +40,7 @@ from ..model.rigid_layout import (
     START_ROW,
 )
 from .rigid_newton import contact_at, contact_ends
+from .rigid_sweeps import mobility_along
 
 # What does not act in the velocity stage wants less than this.
 _OPEN = -1e29
@@ -65,16 +65,6 @@ def start_velocities(tape, s, rigid, k):
         s[at + S_GRADIENT + 3] = a
         s[at + S_GRADIENT + 4] = b
         s[at + S_GRADIENT + 5] = c
-
-
-@inner
-def _give(s, c, solid, arm):
-    """What a unit impulse along the normal does to the velocity there, on one solid."""
-    x = s[c + arm + 1] * s[c + C_NORMAL + 2] - s[c + arm + 2] * s[c + C_NORMAL + 1]
-    y = s[c + arm + 2] * s[c + C_NORMAL] - s[c + arm] * s[c + C_NORMAL + 2]
-    z = s[c + arm] * s[c + C_NORMAL + 1] - s[c + arm + 1] * s[c + C_NORMAL]
-    a, b, d = symmetric_times(s, solid + S_INVERSE_INERTIA, x, y, z)
-    return s[solid + S_INVERSE] + a * x + b * y + d * z
 
 
 @inner
@@ -159,8 +149,10 @@ def pass_blows(tape, s, n, rigid, k, count):
         a, b = contact_ends(tape, n, rigid, i)
         s[c + C_CHANGE] = 0.0
         s[c + C_SHIFT] = 0.0
-        give = _give(s, c, a, C_ARM_A)
-        s[c + C_SPEED + 2] = give + _give(s, c, b, C_ARM_B) if b >= 0 else give
+        give = mobility_along(s, c, a, C_ARM_A, C_NORMAL)
+        if b >= 0:
+            give += mobility_along(s, c, b, C_ARM_B, C_NORMAL)
+        s[c + C_SPEED + 2] = give
         if s[c + C_REBOUND] > 0.0:
             speed, _ = _closing(s, c, a, b)
             meets = s[c + C_REBOUND] / s[c + C_RESTITUTION]

@@ -32,6 +32,7 @@ from ..stage import Stage, stage
 from .base import Solver
 from .gather import clear_velocity_multipliers, gather
 from .stages import begin_stage, end_stage
+from .swept_bodies import SweptBodies
 
 
 @dataclass(frozen=True)
@@ -44,6 +45,11 @@ class GaussSeidel(Solver):
     """
 
     passes: int = 20
+
+    @property
+    def for_bodies(self) -> Solver:
+        """Sweeps over contacts and joints of bodies."""
+        return SweptBodies(passes=self.passes)
 
     @property
     def stage(self) -> Stage:

@@ -74,6 +74,17 @@ def close_over_step(tape, s, n, rigid, k, dt, taut):
 
 
 @inner
+def drift_as_solved(tape, s, rigid, k, dt):
+    """Drift with the impulses at hand, whatever joints do by that."""
+    for i in range(tape[rigid + SOLIDS]):
+        at = solid_at(tape, rigid, i)
+        for c in range(SIX):
+            s[at + S_BASE + c] = s[at + S_VELOCITY + c]
+    drift_solids(tape, s, rigid, k, dt)
+    end_drift(tape, s, rigid, k)
+
+
+@inner
 def join_again(tape, s, n, rigid, k, dt):
     """Move solids the least that closes their joints, in the metric of their masses; velocities stay as they are."""
     worst = 0.0

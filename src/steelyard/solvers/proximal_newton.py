@@ -13,8 +13,7 @@ the compliance R out (the proximal point method), and |u_t| in the shift mu |u_t
 and costs a test.
 
 In the position stage b = -gap/dt keeps surfaces from passing within the step; in the velocity stage contacts that
-closed get b = 0, or the speed at which they rebound. Where surfaces overlap by more than ``slop`` a last solve from
-rest moves them apart; its velocities are forgotten.
+closed get b = 0, or the speed at which they rebound (``rigid_stages``).
 
 Source: Castro, Permenter & Han (2022), *An Unconstrained Convex Formulation of Compliant Contact*; Carpentier,
 Le Lidec & Montaut (2024), *From Compliant to Rigid Contact Simulation*; Acary, Cadoux, Lemarechal & Malick (2011).
@@ -23,84 +22,20 @@ Le Lidec & Montaut (2024), *From Compliant to Rigid Contact Simulation*; Acary, 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import sqrt
-from typing import ClassVar
 
-from ..collision.contact_list import (
-    find_contacts,
-    match_contacts,
-    place_colliders,
-    prepare_contacts,
-)
-from ..constraints.contact_rows import relative_velocity, world_vector
-from ..constraints.joints import POSITIONS, PUSHES, VELOCITIES, begin_joints, store_joints, tautness
-from ..constraints.solids import (
-    gather_solids,
-    move_solids,
-    pay_for_lifts,
-    rest_solids,
-    scatter_velocities,
-)
-from ..kernel import inner
-from ..math.lanes import load, splat, store
-from ..math.pointers import LANES, doubles_at
 from ..model.rigid_layout import (
-    C_BEFORE,
-    C_EARLIER,
-    C_FRICTION,
-    C_GAP,
-    C_HELD,
-    C_ID,
-    C_IMPULSE,
-    C_LEAST,
-    C_PLACE,
-    C_REBOUND,
-    C_RESTITUTION,
-    CAPACITY,
-    JOINTS,
-    N_SLOP,
-    NUMBERS,
-    S_FREE,
-    S_GRADIENT,
-    SOLID,
-    SOLID_RECORDS,
-    SOLIDS,
-    START_ROW,
-    STORED,
-    STORED_ROW,
-    T_HELD,
-    T_ID,
-    T_IMPULSE,
-    T_PLACE,
-    T_REBOUND,
+    N_COMPLIANCE,
+    N_IMPULSE,
+    N_ITERATIONS,
+    N_PASSES,
+    N_SHIFT,
+    N_TOLERANCE,
 )
-from ..model.tape import COUNT, H_BLOCKS, H_DT, H_RIGID
-from ..scene import checks
-from ..stage import Stage, stage
-from .base import Solver
-from .blows import pass_blows, start_velocities
-from .joint_closing import close_over_step, join_again
-from .rigid_islands import ALL, PUSH, solve_islands
-from .rigid_newton import contact_at, contact_ends
-from .sleep import (
-    all_asleep,
-    fall_asleep,
-    hold_sleepers,
-    keep_sleeping_contacts,
-    wake_changed,
-    wake_touched,
-)
-
-# Share of a penetration that one step takes away, and the fastest push [m/s].
-_SHARE, _FASTEST = 1.0, 3.0
-# A gap [m] at which a contact that carried nothing is closed all the same.
-_CLOSED = 1e-10
-# A gap [m] that nothing closes.
-_AT_REST = 1e-9
+from .rigid_stages import RigidSolver
 
 
 @dataclass(frozen=True)
-class ProximalNewton(Solver):
+class ProximalNewton(RigidSolver):
     """Rigid contacts by the proximal Newton method (see the module).
 
     Args:
@@ -118,223 +53,15 @@ class ProximalNewton(Solver):
     tolerance: float = 1e-9
     passes: int = 6
     iterations: int = 60
-    slop: float = 1e-4
-    contacts: int | None = None
-    rest_speed: float = 1e-6
-    rest_time: float | None = 0.5
-    staged: ClassVar[bool] = True
-    rigid: ClassVar[bool] = True
-
-    def __post_init__(self) -> None:
-        checks.number(
-            "ProximalNewton",
-            "slop",
-            self.slop,
-            checks.Limit(above=0.0, remedy="Use 1e-4 for a tenth of a millimetre."),
-        )
-        if self.contacts is not None:
-            checks.whole(
-                "ProximalNewton", "contacts", self.contacts, least=1, remedy="Leave it out."
-            )
-        above = checks.Limit(above=0.0, remedy="Use 1e-6 for a micrometre per second.")
-        checks.number("ProximalNewton", "rest_speed", self.rest_speed, above)
-        if self.rest_time is not None:
-            limit = checks.Limit(least=0.0, remedy="Use 0.5, or None where nothing shall sleep.")
-            checks.number("ProximalNewton", "rest_time", self.rest_time, limit)
 
     @property
-    def settings(self) -> tuple[float, ...]:
-        """Numbers in the order of the layout."""
-        rest = self.rest_time if self.rest_time is not None else 0.0
-        return (
-            1e-5, self.tolerance, 1e-9, 1e-4, self.slop, self.passes, self.iterations, self.rest_speed, rest
-        )  # fmt: skip
-
-    @property
-    def start(self) -> Stage:
-        """Notes velocities, from which rebounds follow."""
-        return keep_start_velocities
-
-    @property
-    def stage(self) -> Stage:
-        """Contacts of the position stage (half 0) or of the velocity stage (half 1)."""
-        return proximal_newton_stage
-
-
-@inner
-def _store_contacts(tape, s, n, rigid, k, count, kept):
-    """Ids, impulses, places and rebounds of the contacts at hand, for the next stage, behind those that are kept."""
-    for j in range(tape[rigid + CAPACITY] - kept):
-        at = LANES * (tape[rigid + STORED_ROW] + STORED * (kept + j)) + k
-        if j < count:
-            c = contact_at(tape, rigid, j)
-            s[at] = s[c + C_ID] + 1.0
-            x, y, z = world_vector(
-                s, c, s[c + C_IMPULSE], s[c + C_IMPULSE + 1], s[c + C_IMPULSE + 2]
-            )
-            s[at + LANES * T_IMPULSE] = x
-            s[at + LANES * (T_IMPULSE + 1)] = y
-            s[at + LANES * (T_IMPULSE + 2)] = z
-            for i in range(3):
-                s[at + LANES * (T_PLACE + i)] = s[c + C_PLACE + i]
-            s[at + LANES * T_REBOUND] = s[c + C_REBOUND]
-            s[at + LANES * T_HELD] = s[c + C_HELD]
-        else:
-            # What lies behind the last is not looked at.
-            s[at + LANES * T_ID] = 0.0
-            break
-
-
-@inner
-def _rebounds(tape, s, n, rigid, k, count, dt):
-    """Speed at which contacts that closed within the step leave, from that at which they met.
-
-    Under the normal acceleration a of free motion the surfaces meet at the square of their speed at the start minus
-    2 a gap: so energy is what restitution says, whatever the step.
-    """
-    start_velocities(tape, s, rigid, k)
-    for i in range(count):
-        c = contact_at(tape, rigid, i)
-        s[c + C_REBOUND] = 0.0
-        if s[c + C_RESTITUTION] > 0.0:
-            a, b = contact_ends(tape, n, rigid, i)
-            before, _, _ = relative_velocity(s, c, a, b, S_GRADIENT)
-            half, _, _ = relative_velocity(s, c, a, b, S_FREE)
-            gap = s[c + C_GAP]
-            if gap + dt * half < 0.0:
-                square = before * before - 4.0 * (half - before) / dt * gap
-                s[c + C_REBOUND] = s[c + C_RESTITUTION] * sqrt(max(square, 0.0))
-
-
-@inner
-def _contacts_at_hand(tape, s, n, rigid, k, dt):
-    """Solids and contacts of lane k in the work area, with what is known of them from the last stage.
-
-    Returns:
-        How many contacts there are, and how many of the stored ones are kept for what sleeps.
-    """
-    count = 0
-    kept = 0
-    while True:
-        gather_solids(tape, s, rigid, k)
-        kept = keep_sleeping_contacts(tape, s, rigid, k)
-        place_colliders(tape, s, rigid, k, dt)
-        count = find_contacts(tape, s, n, rigid, k, kept)
-        if not wake_touched(tape, s, rigid, k, count):
-            break
-    hold_sleepers(tape, s, rigid, k)
-    prepare_contacts(tape, s, n, rigid, count)
-    match_contacts(tape, s, n, rigid, k, count, kept)
-    return count, kept
-
-
-@inner
-def _position_stage(tape, s, n, rigid, k, dt):
-    """Before the drift: no gap may close beyond touching."""
-    slop = doubles_at(tape[rigid + NUMBERS])[N_SLOP]
-    count, kept = _contacts_at_hand(tape, s, n, rigid, k, dt)
-    if tape[rigid + START_ROW] >= 0:
-        _rebounds(tape, s, n, rigid, k, count, dt)
-    for i in range(count):
-        c = contact_at(tape, rigid, i)
-        gap = s[c + C_GAP]
-        # What rests keeps its gap: else impulses would change with its rounding at every step.
-        s[c + C_LEAST] = -gap / dt if gap > _AT_REST else 0.0
-        # Friction on what is open follows where it is closed: across the gap it would have a lever that is not there.
-        opened = gap > slop or (gap > _AT_REST and s[c + C_BEFORE] == 0.0)
-        s[c + C_HELD] = 0.0
-        s[c + C_EARLIER] = 0.0 if opened else 1.0
-        if opened:
-            s[c + C_FRICTION] = 0.0
-    begin_joints(tape, s, rigid, k, dt, POSITIONS)
-    taut = tautness(tape, s, rigid, k, dt)
-    solve_islands(tape, s, n, rigid, count, k, ALL)
-    closed = True
-    if tape[rigid + JOINTS] > 0:
-        closed = close_over_step(tape, s, n, rigid, k, dt, taut)
-    scatter_velocities(tape, s, rigid, k)
-    for i in range(count):
-        c = contact_at(tape, rigid, i)
-        if s[c + C_EARLIER] == 0.0:
-            s[c + C_HELD] = s[c + C_IMPULSE]
-    _store_contacts(tape, s, n, rigid, k, count, kept)
-    store_joints(tape, s, rigid, k, dt, False)
-    if not closed:
-        join_again(tape, s, n, rigid, k, dt)
-
-
-@inner
-def _velocity_stage(tape, s, n, rigid, k, dt):
-    """After the last kick: surfaces that touch do not approach; then overlaps are pushed apart."""
-    numbers = doubles_at(tape[rigid + NUMBERS])
-    slop = numbers[N_SLOP]
-    count, kept = _contacts_at_hand(tape, s, n, rigid, k, dt)
-    deep = False
-    for i in range(count):
-        c = contact_at(tape, rigid, i)
-        closed = s[c + C_GAP] <= _CLOSED or s[c + C_BEFORE] > 0.0
-        if s[c + C_HELD] > 0.0:
-            # Closed within this step: nothing is known yet of what bears it.
-            for axis in range(3):
-                s[c + C_BEFORE + axis] = 0.0
-        # What is open does not act: it would have to approach at more than light.
-        s[c + C_LEAST] = s[c + C_REBOUND] if closed else -1e30
-        deep = deep or s[c + C_GAP] < -slop
-    pass_blows(tape, s, n, rigid, k, count)
-    begin_joints(tape, s, rigid, k, dt, VELOCITIES)
-    solve_islands(tape, s, n, rigid, count, k, ALL)
-    scatter_velocities(tape, s, rigid, k)
-    for i in range(count):
-        s[contact_at(tape, rigid, i) + C_HELD] = 0.0
-    _store_contacts(tape, s, n, rigid, k, count, kept)
-    store_joints(tape, s, rigid, k, dt, True)
-    fall_asleep(tape, s, n, rigid, k, count, dt)
-    if deep:
-        _push_apart(tape, s, n, rigid, k, count, dt, slop)
-
-
-@inner
-def _push_apart(tape, s, n, rigid, k, count, dt, slop):
-    """Move overlapping solids apart by a solve from rest, of which no velocity stays."""
-    rest_solids(tape, s, rigid)
-    for i in range(count):
-        c = contact_at(tape, rigid, i)
-        gap = s[c + C_GAP]
-        s[c + C_LEAST] = min(-_SHARE * gap / dt, _FASTEST) if gap < -slop else -max(gap, 0.0) / dt
-    begin_joints(tape, s, rigid, k, dt, PUSHES)
-    solve_islands(tape, s, n, rigid, count, k, PUSH)
-    move_solids(tape, s, rigid, k, dt)
-    pay_for_lifts(tape, s, rigid, k, dt)
-
-
-@stage
-def keep_start_velocities(tape, s, skip, half):
-    """Velocities and momenta before the first kick, from which rebounds follow."""
-    rigid = tape[H_RIGID]
-    start = tape[rigid + START_ROW]
-    if start >= 0:
-        record = tape[rigid + SOLID_RECORDS]
-        for _ in range(tape[rigid + SOLIDS]):
-            for c in range(3):
-                store(s, start + c, load(s, tape[record + 2] + c))
-                momentum = tape[record + 3]
-                store(s, start + 3 + c, load(s, momentum + c) if momentum >= 0 else splat(0.0))
-            start += 6
-            record += SOLID
-
-
-@stage
-def proximal_newton_stage(tape, s, skip, half):
-    """Position stage, before the drift, or velocity stage, after the last kick, of every lane that is a world."""
-    rigid = tape[H_RIGID]
-    dt = s[LANES * tape[H_DT]]
-    for k in range(skip[tape[H_BLOCKS] + COUNT]):
-        if half == 0:
-            if wake_changed(tape, s, rigid, k):
-                _position_stage(tape, s, skip, rigid, k, dt)
-            else:
-                hold_sleepers(tape, s, rigid, k)
-        elif all_asleep(tape, s, rigid, k):
-            hold_sleepers(tape, s, rigid, k)
-        else:
-            _velocity_stage(tape, s, skip, rigid, k, dt)
+    def own_settings(self) -> dict[int, float]:
+        """Those of Newton's method."""
+        return {
+            N_COMPLIANCE: 1e-5,
+            N_TOLERANCE: self.tolerance,
+            N_IMPULSE: 1e-9,
+            N_SHIFT: 1e-4,
+            N_PASSES: self.passes,
+            N_ITERATIONS: self.iterations,
+        }

@@ -1,4 +1,4 @@
-"""Proximal passes of every island of one world, and a soft one where they do not settle."""
+"""Every island of one world: proximal passes, and a soft one where they do not settle; or sweeps."""
 
 from __future__ import annotations
 
@@ -37,6 +37,7 @@ from ..model.rigid_layout import (
     N_ITERATIONS,
     N_PASSES,
     N_SHIFT,
+    N_SWEEPS,
     N_TOLERANCE,
     NUMBERS,
     OFF,
@@ -53,6 +54,7 @@ from ..model.tape import H_UNSETTLED
 from .block_cholesky import SIX
 from .islands import UNSEEN, gather_island, join_all
 from .rigid_newton import contact_at, contact_ends, impulse_at, minimise
+from .rigid_sweeps import sweep_island
 
 # Compliance of the fallback, which is solved once, and of the push, over the mobility of a contact.
 _SOFT, _PUSH = 1e-4, 1e-3
@@ -164,6 +166,9 @@ def _solve_island(tape, s, n, rigid, size, contacts, joints, rows, what):
     tolerance = numbers[N_TOLERANCE] if what == ALL else _ROUGH
     iterations = int(numbers[N_ITERATIONS])
     _begin_velocity(tape, s, n, rigid, size, contacts, joints, True)
+    if numbers[N_SWEEPS] > 0.0:
+        sweep_island(tape, s, n, rigid, contacts, joints)
+        return True
     change = 0.0
     for j in range(contacts):
         i = n[tape[rigid + LIST] + j]
@@ -224,9 +229,10 @@ def _solve_island(tape, s, n, rigid, size, contacts, joints, rows, what):
 def _solve_softly(tape, s, n, rigid, size, contacts, joints, rows, compliance):
     """One pass with softer contacts from nothing; whether it settled."""
     numbers = doubles_at(tape[rigid + NUMBERS])
+    swept = numbers[N_SWEEPS] > 0.0
     for j in range(contacts):
         c = contact_at(tape, rigid, n[tape[rigid + LIST] + j])
-        s[c + C_COMPLIANCE] = compliance * s[c + C_WEIGHT]
+        s[c + C_COMPLIANCE] = 0.0 if swept else compliance * s[c + C_WEIGHT]
         s[c + C_SHIFT] = 0.0
         for k in range(3):
             s[c + C_BEFORE + k] = 0.0
@@ -237,6 +243,9 @@ def _solve_softly(tape, s, n, rigid, size, contacts, joints, rows, compliance):
             s[row + J_BEFORE] = s[row + J_OFFSET]
             row += ROW_ENTRIES
     _begin_velocity(tape, s, n, rigid, size, contacts, joints, False)
+    if swept:
+        sweep_island(tape, s, n, rigid, contacts, joints)
+        return True
     few = int(numbers[N_ITERATIONS])
     loose = 10.0 * numbers[N_TOLERANCE]
     taken = minimise(tape, s, n, rigid, size, contacts, joints, rows, loose, 2 * few)

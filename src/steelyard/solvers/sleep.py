@@ -31,6 +31,7 @@ from ..model.rigid_layout import (
     END_A,
     END_B,
     LOCAL,
+    N_HERTZ,
     N_REST_SPEED,
     N_REST_TIME,
     N_SLOP,
@@ -236,7 +237,8 @@ def _count_rest(tape, s, n, rigid, k, count, dt):
             s[at] = s[at] + dt if speed <= numbers[N_REST_SPEED] else 0.0
     for i in range(count):
         # What is still to be pushed apart moves without a velocity.
-        if s[contact_at(tape, rigid, i) + C_GAP] < -numbers[N_SLOP]:
+        pushed = numbers[N_HERTZ] == 0.0
+        if pushed and s[contact_at(tape, rigid, i) + C_GAP] < -numbers[N_SLOP]:
             for end in range(2):
                 solid = n[tape[rigid + (END_A if end == 0 else END_B)] + i]
                 if solid >= 0:

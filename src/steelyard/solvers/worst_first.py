@@ -38,6 +38,7 @@ from ..model.tape import (
 )
 from ..stage import Stage, stage
 from .base import Solver
+from .swept_bodies import SweptBodies
 
 # Columns of the local contact list.
 _NX, _NY, _NZ, _DEPTH, _RESTITUTION, _FRICTION, _MOVE_A, _MOVE_B = 0, 1, 2, 3, 4, 5, 6, 9
@@ -53,6 +54,11 @@ class WorstFirst(Solver):
 
     iterations: int = 0
     staged: ClassVar[bool] = False
+
+    @property
+    def for_bodies(self) -> Solver:
+        """The worst contact or joint of bodies first."""
+        return SweptBodies(passes=self.iterations or 2, worst=True, per_row=self.iterations == 0)
 
     @property
     def stage(self) -> Stage:

@@ -1,0 +1,247 @@
+"""Sweeps over the contacts and joints of an island: one after the other, or the worst first.
+
+Impulses are summed per row and clamped as sums, friction to the disc that the normal impulse at hand allows. A row of
+compliance R moves by (wanted - u - R l)/(w + R), w what a unit impulse along it does to its velocity u.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+from ..constraints.contact_rows import relative_velocity, world_vector
+from ..constraints.joint_rows import joint_at, joint_solids, row_at, row_velocity
+from ..constraints.solids import symmetric_times
+from ..kernel import inner
+from ..math.pointers import doubles_at
+from ..model.rigid_layout import (
+    C_ARM_A,
+    C_ARM_B,
+    C_BEFORE,
+    C_BINORMAL,
+    C_COMPLIANCE,
+    C_DERIVATIVE,
+    C_FRICTION,
+    C_HELD,
+    C_IMPULSE,
+    C_LEAST,
+    C_NORMAL,
+    C_TANGENT,
+    HELD,
+    J_BEFORE,
+    J_COMPLIANCE,
+    J_FORCE,
+    J_HIGH,
+    J_IMPULSE,
+    J_KIND,
+    J_LEAST,
+    J_LOW,
+    J_TORQUE_A,
+    J_TORQUE_B,
+    J_WEIGHT,
+    LIST,
+    N_SWEEPS,
+    N_WORST,
+    NUMBERS,
+    OFF,
+    ROW_ENTRIES,
+    S_INVERSE,
+    S_INVERSE_INERTIA,
+    S_VELOCITY,
+)
+from .rigid_newton import contact_at, contact_ends
+
+
+@inner
+def mobility_along(s, c, solid, arm, direction):
+    """What a unit impulse at a contact does to the velocity along its direction there, on one solid."""
+    nx = s[c + direction]
+    ny = s[c + direction + 1]
+    nz = s[c + direction + 2]
+    x = s[c + arm + 1] * nz - s[c + arm + 2] * ny
+    y = s[c + arm + 2] * nx - s[c + arm] * nz
+    z = s[c + arm] * ny - s[c + arm + 1] * nx
+    a, b, d = symmetric_times(s, solid + S_INVERSE_INERTIA, x, y, z)
+    return s[solid + S_INVERSE] + a * x + b * y + d * z
+
+
+@inner
+def _move(s, solid, fx, fy, fz, tx, ty, tz):
+    """Change a solid's velocities by an impulse and its moment."""
+    v = solid + S_VELOCITY
+    inverse = s[solid + S_INVERSE]
+    s[v] += inverse * fx
+    s[v + 1] += inverse * fy
+    s[v + 2] += inverse * fz
+    a, b, c = symmetric_times(s, solid + S_INVERSE_INERTIA, tx, ty, tz)
+    s[v + 3] += a
+    s[v + 4] += b
+    s[v + 5] += c
+
+
+@inner
+def _push(s, c, a, b, n, t, u):
+    """Change the velocities of both solids by an impulse along normal and tangents."""
+    fx, fy, fz = world_vector(s, c, n, t, u)
+    x = s[c + C_ARM_A]
+    y = s[c + C_ARM_A + 1]
+    z = s[c + C_ARM_A + 2]
+    _move(s, a, fx, fy, fz, y * fz - z * fy, z * fx - x * fz, x * fy - y * fx)
+    if b >= 0:
+        x = s[c + C_ARM_B]
+        y = s[c + C_ARM_B + 1]
+        z = s[c + C_ARM_B + 2]
+        _move(s, b, -fx, -fy, -fz, z * fy - y * fz, x * fz - z * fx, y * fx - x * fy)
+
+
+@inner
+def _begin(tape, s, n, rigid, contacts, joints):
+    """Impulses of the stage before, and mobilities."""
+    for j in range(contacts):
+        i = n[tape[rigid + LIST] + j]
+        c = contact_at(tape, rigid, i)
+        a, b = contact_ends(tape, n, rigid, i)
+        for k in range(3):
+            s[c + C_IMPULSE + k] = s[c + C_BEFORE + k]
+            direction = C_NORMAL if k == 0 else (C_TANGENT if k == 1 else C_BINORMAL)
+            mobility = mobility_along(s, c, a, C_ARM_A, direction)
+            if b >= 0:
+                mobility += mobility_along(s, c, b, C_ARM_B, direction)
+            s[c + C_DERIVATIVE + k] = mobility
+        # So far over the mobility.
+        s[c + C_COMPLIANCE] *= s[c + C_DERIVATIVE]
+    for j in range(joints):
+        joint = joint_at(tape, rigid, n[tape[rigid + HELD] + j])
+        row = row_at(tape, rigid, tape[joint + 4])
+        for _ in range(tape[joint + 5]):
+            s[row + J_IMPULSE] = s[row + J_BEFORE]
+            row += ROW_ENTRIES
+
+
+@inner
+def _normal_change(s, c, u):
+    """Change of a contact's normal impulse at a normal velocity."""
+    give = s[c + C_COMPLIANCE]
+    before = s[c + C_IMPULSE]
+    after = before + (s[c + C_LEAST] - u - give * before) / (s[c + C_DERIVATIVE] + give)
+    return max(after, 0.0) - before
+
+
+@inner
+def _sweep_contact(s, c, a, b):
+    """Normal impulse, then friction, of one contact."""
+    u0, _, _ = relative_velocity(s, c, a, b, S_VELOCITY)
+    change = _normal_change(s, c, u0)
+    if change != 0.0:
+        s[c + C_IMPULSE] += change
+        _push(s, c, a, b, change, 0.0, 0.0)
+    most = s[c + C_FRICTION] * (s[c + C_IMPULSE] + s[c + C_HELD])
+    l1 = s[c + C_IMPULSE + 1]
+    l2 = s[c + C_IMPULSE + 2]
+    if most > 0.0 or l1 != 0.0 or l2 != 0.0:
+        _, u1, u2 = relative_velocity(s, c, a, b, S_VELOCITY)
+        t1 = l1 - u1 / s[c + C_DERIVATIVE + 1]
+        t2 = l2 - u2 / s[c + C_DERIVATIVE + 2]
+        size = sqrt(t1 * t1 + t2 * t2)
+        if size > most:
+            share = most / size
+            t1 *= share
+            t2 *= share
+        s[c + C_IMPULSE + 1] = t1
+        s[c + C_IMPULSE + 2] = t2
+        _push(s, c, a, b, 0.0, t1 - l1, t2 - l2)
+
+
+@inner
+def _row_change(s, row, a, b):
+    """Change of the impulse along a joint's row."""
+    u = row_velocity(s, row, a, b, S_VELOCITY)
+    give = s[row + J_COMPLIANCE]
+    before = s[row + J_IMPULSE]
+    after = before + (s[row + J_LEAST] - u - give * before) / (s[row + J_WEIGHT] + give)
+    return min(max(after, s[row + J_LOW]), s[row + J_HIGH]) - before
+
+
+@inner
+def _sweep_row(s, row, a, b):
+    """One row of a joint."""
+    change = _row_change(s, row, a, b)
+    s[row + J_IMPULSE] += change
+    fx = change * s[row + J_FORCE]
+    fy = change * s[row + J_FORCE + 1]
+    fz = change * s[row + J_FORCE + 2]
+    t = row + J_TORQUE_A
+    _move(s, a, fx, fy, fz, change * s[t], change * s[t + 1], change * s[t + 2])
+    t = row + J_TORQUE_B
+    _move(s, b, -fx, -fy, -fz, -change * s[t], -change * s[t + 1], -change * s[t + 2])
+
+
+@inner
+def _sweep(tape, s, n, rigid, contacts, joints):
+    """All joints, then all contacts, once."""
+    for j in range(joints):
+        joint = joint_at(tape, rigid, n[tape[rigid + HELD] + j])
+        a, b = joint_solids(tape, rigid, joint)
+        row = row_at(tape, rigid, tape[joint + 4])
+        for _ in range(tape[joint + 5]):
+            if s[row + J_KIND] != OFF:
+                _sweep_row(s, row, a, b)
+            row += ROW_ENTRIES
+    for j in range(contacts):
+        i = n[tape[rigid + LIST] + j]
+        a, b = contact_ends(tape, n, rigid, i)
+        _sweep_contact(s, contact_at(tape, rigid, i), a, b)
+
+
+@inner
+def _mend_worst(tape, s, n, rigid, contacts, joints):
+    """The contact, or the row of a joint, whose velocity is furthest from what it must be; whether there was one."""
+    worst = 0.0
+    found = -1
+    found_row = -1
+    for j in range(joints):
+        joint = joint_at(tape, rigid, n[tape[rigid + HELD] + j])
+        a, b = joint_solids(tape, rigid, joint)
+        row = row_at(tape, rigid, tape[joint + 4])
+        for _ in range(tape[joint + 5]):
+            if s[row + J_KIND] != OFF:
+                off = abs(_row_change(s, row, a, b)) * s[row + J_WEIGHT]
+                if off > worst:
+                    worst = off
+                    found = n[tape[rigid + HELD] + j]
+                    found_row = row
+            row += ROW_ENTRIES
+    contact = -1
+    for j in range(contacts):
+        i = n[tape[rigid + LIST] + j]
+        c = contact_at(tape, rigid, i)
+        a, b = contact_ends(tape, n, rigid, i)
+        u0, _, _ = relative_velocity(s, c, a, b, S_VELOCITY)
+        off = abs(_normal_change(s, c, u0)) * s[c + C_DERIVATIVE]
+        if off > worst:
+            worst = off
+            contact = i
+    if contact >= 0:
+        a, b = contact_ends(tape, n, rigid, contact)
+        _sweep_contact(s, contact_at(tape, rigid, contact), a, b)
+    elif found >= 0:
+        a, b = joint_solids(tape, rigid, joint_at(tape, rigid, found))
+        _sweep_row(s, found_row, a, b)
+    return contact >= 0 or found >= 0
+
+
+@inner
+def sweep_island(tape, s, n, rigid, contacts, joints):
+    """Impulses of an island from velocities that hold those of the stage before."""
+    numbers = doubles_at(tape[rigid + NUMBERS])
+    sweeps = int(numbers[N_SWEEPS])
+    _begin(tape, s, n, rigid, contacts, joints)
+    if numbers[N_WORST] == 0.0:
+        for _ in range(sweeps):
+            _sweep(tape, s, n, rigid, contacts, joints)
+    else:
+        # Contacts in turn once in the end, for friction where nothing closes.
+        turns = sweeps * (contacts + joints) if numbers[N_WORST] == 2.0 else sweeps
+        for _ in range(turns):
+            if not _mend_worst(tape, s, n, rigid, contacts, joints):
+                break
+        _sweep(tape, s, n, rigid, contacts, joints)
