@@ -51,6 +51,16 @@ def test_a_ball_leaves_the_ground_at_e_times_the_speed_of_impact(e, dt):
     assert speed**2 + 2 * 9.81 * height == pytest.approx(e**2 * 2 * 9.81, abs=1e-10)
 
 
+@pytest.mark.parametrize("rate", [60, 120, 240, 480])
+def test_a_ball_that_just_touches_when_a_step_ends_rebounds(rate):
+    scene = sy.Scene(gravity=(0, 0, 0))
+    scene.add(sy.Body(position=(0, 1.0, 0), velocity=(0, -4, 0), parts=sy.Sphere(0.25)))
+    scene.add(sy.Ground(restitution=0.5))
+    world = sy.World(scene, method=sy.Method(sy.Rattle(), sy.ProximalNewton(), dt=1 / rate))
+    world.step(rate // 2)
+    assert world.bodies.velocity[0, 0, 1] == pytest.approx(2.0, abs=1e-9)
+
+
 @pytest.mark.parametrize("e", [0.0, 0.5, 1.0])
 @pytest.mark.parametrize("friction", [0.1, 0.2, 0.9])
 @pytest.mark.parametrize("dt", [1 / 60, 1 / 240])

@@ -61,6 +61,8 @@ from ..model.rigid_layout import (
 )
 from .narrow_phase import IDS, POINT, collide
 
+# Gap [m] beyond what both may move at which points are still kept: what just touches at the end must be known before.
+_SLACK = 1e-9
 # How far a point may be from a stored one of its pair to take its impulse, over the reach of its colliders.
 _NEAR = 0.25
 
@@ -169,7 +171,7 @@ def find_contacts(tape, s, n, rigid, k, kept):
         kind_b = tape[colliders + COLLIDER * second]
         one = tape[colliders + COLLIDER * first + 1]
         other = _movable(tape, s, rigid, tape[colliders + COLLIDER * second + 1])
-        margin = s[a + _MOVE] + s[b + _MOVE]
+        margin = _SLACK + s[a + _MOVE] + s[b + _MOVE]
         free = other >= 0 or _movable(tape, s, rigid, one) >= 0
         if free and not _apart(s, kind_b, a, b, margin):
             found = collide(s, kind_a, a, kind_b, b, points, work, margin)

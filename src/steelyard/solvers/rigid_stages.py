@@ -200,7 +200,8 @@ def _rebounds(tape, s, n, rigid, k, count, dt):
             before, _, _ = relative_velocity(s, c, a, b, S_GRADIENT)
             half, _, _ = relative_velocity(s, c, a, b, S_FREE)
             gap = s[c + C_GAP]
-            if gap + dt * half < 0.0:
+            # What ends as near as the velocity stage takes for closed counts: else its speed would be lost.
+            if half < 0.0 and gap + dt * half < _CLOSED:
                 square = before * before - 4.0 * (half - before) / dt * gap
                 s[c + C_REBOUND] = s[c + C_RESTITUTION] * sqrt(max(square, 0.0))
 
