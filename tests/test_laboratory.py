@@ -43,7 +43,7 @@ def best(problem: Problem) -> tuple[sy.Scene, sy.Candidate]:
 def test_a_wrong_engine_is_caught(name: str) -> None:
     problem = PROBLEMS[name]
     right = worst(problem.errors(motion(problem, *best(problem))))
-    assert right < 3e-4
+    assert right < problem.follows
     defects = {defect: build() for defect, build in problem.wrong.items()}
     told = 0
     for defect, scene in defects.items():

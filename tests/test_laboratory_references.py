@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import mpmath
 import numpy as np
@@ -23,6 +24,7 @@ from benchmarks.laboratory.problems import (
     catenary,
     cloth,
     collision,
+    contact,
     net,
     projectile,
     top,
@@ -307,3 +309,47 @@ def test_projectile_without_drag_is_the_limit_of_little_drag() -> None:
     np.testing.assert_allclose(
         thin.position[:, 0, 1], exact - 0.5 * 9.81 * times**2, rtol=0, atol=1e-4
     )
+
+
+@pytest.mark.parametrize(
+    ("scene", "motion", "constant"),
+    [
+        (contact.sliding_block, contact.sliding, False),
+        (contact.rolling_ball, contact.rolling, False),
+        (contact.bouncing_body, contact.bouncing, False),
+        (contact.cradle, contact.swinging, True),
+    ],
+)
+def test_bodies_that_touch_start_with_the_scene_and_move_as_they_say(
+    scene: Any, motion: Any, constant: bool
+) -> None:
+    start = motion(np.array([0.0]))
+    places, speeds = sy.landmarks(sy.World(scene()))
+    np.testing.assert_allclose(start.position[0], places[0], atol=1e-12)
+    np.testing.assert_allclose(start.velocity[0], speeds[0], atol=1e-12)
+    # Between events: places change by the velocities.
+    h = 1e-4
+    times = np.array([0.11, 0.31, 0.62, 0.87, 1.23])
+    before, now, after = motion(times - h), motion(times), motion(times + h)
+    rates = (after.position - before.position) / (2 * h)
+    np.testing.assert_allclose(rates, now.velocity, atol=2e-5)
+    energy = contact.energy_of(scene())(now.position, now.velocity)
+    own = sy.World(scene()).energy[0]
+    if constant:
+        np.testing.assert_allclose(energy - energy[0], 0.0, atol=1e-9 * abs(own) + 1e-12)
+    assert (np.diff(energy) <= 1e-9 * abs(own)).all()
+    np.testing.assert_allclose(
+        contact.energy_of(scene())(start.position, start.velocity)[0], own, rtol=1e-12
+    )
+
+
+def test_a_rolling_ball_does_not_slip_and_keeps_its_moment_about_the_ground() -> None:
+    true = contact.rolling(np.array([0.1, 0.4, 0.5, 1.0]))
+    speed = true.velocity.reshape(4, 4, 3)
+    spin = 0.5 * np.cross(
+        np.diff(true.position.reshape(4, 4, 3)[:, [0, 1]], axis=1), speed[:, 1:2] - speed[:, :1]
+    )
+    v, w = speed[:, 0, 0], 2.0 * spin[:, 0, 2]
+    np.testing.assert_allclose(v[2:] + contact.RADIUS * w[2:], 0.0, atol=1e-12)
+    assert (v[:2] + contact.RADIUS * w[:2] > 0.1).all()
+    np.testing.assert_allclose(v - 0.4 * contact.RADIUS * w, contact.SPEED, rtol=1e-12)

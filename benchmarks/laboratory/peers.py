@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -9,9 +10,11 @@ import mujoco
 import numpy as np
 import pymunk
 
+import steelyard as sy
 from benchmarks.laboratory.engines import BrokenRunError
 from benchmarks.laboratory.problem import Peer
 from benchmarks.peers import mujoco_scenes
+from benchmarks.peers.mujoco_bodies import BodyFlight, BodySettings
 from benchmarks.scenes import Array, ParticleScene
 
 # By default MuJoCo writes each warning to a file of the working folder.
@@ -172,3 +175,111 @@ def pymunk_space(
 ) -> dict[str, Peer]:
     """The peer that a space makes."""
     return {name: lambda dt: Pymunk(build, dt)}
+
+
+class MuJoCoBodies:
+    """A scene of free bodies in MuJoCo, seen by its landmarks.
+
+    Args:
+        scene: Bodies, a ground and collisions of all.
+        settings: How it is stepped.
+    """
+
+    def __init__(self, scene: sy.Scene, settings: BodySettings) -> None:
+        self.scene, self.settings = scene, settings
+        self.reset()
+
+    def reset(self) -> None:
+        """See ``Stepper``."""
+        self.flight = BodyFlight(self.scene, self.settings)
+        bodies = self.scene.bodies
+        self.flight.push(
+            np.array([body.velocity for body in bodies]),
+            np.array([body.angular_velocity for body in bodies]),
+        )
+
+    def step(self, steps: int) -> None:
+        """See ``Stepper``."""
+        self.flight.step(steps)
+
+    def state(self) -> tuple[Array, Array]:
+        """See ``Stepper``."""
+        data = self.flight.data
+        mujoco.mj_kinematics(self.flight.model, data)
+        count = len(self.scene.bodies)
+        turn = data.xmat[1 : count + 1].reshape(-1, 3, 3)
+        speed = data.qvel.reshape(count, 6)
+        spin = np.einsum("bij,bj->bi", turn, speed[:, 3:])
+        return _landmarks(data.xpos[1 : count + 1], turn, speed[:, :3], spin)
+
+
+def _landmarks(place: Array, turn: Array, velocity: Array, spin: Array) -> tuple[Array, Array]:
+    """Origins and ends of the unit axes of bodies, and their velocities."""
+    arms = np.concatenate([np.zeros_like(turn[:, :1]), np.swapaxes(turn, 1, 2)], axis=1)
+    places = place[:, None] + arms
+    speeds = velocity[:, None] + np.cross(spin[:, None], arms)
+    return places.reshape(-1, 3), speeds.reshape(-1, 3)
+
+
+def mujoco_bodies(scene: sy.Scene) -> dict[str, Peer]:
+    """Peers of a scene of free bodies, one per cone of friction."""
+
+    def peer(cone: str) -> Peer:
+        return lambda dt: MuJoCoBodies(scene, BodySettings(dt=dt, cone=cone))
+
+    return {f"MuJoCo {cone}": peer(cone) for cone in ("elliptic", "pyramidal")}
+
+
+class PymunkBodies(Pymunk):
+    """A scene of balls and boxes in the plane z = 0, seen by its landmarks."""
+
+    def __init__(self, scene: sy.Scene, dt: float) -> None:
+        super().__init__(lambda: _planar_space(scene), dt)
+
+    def state(self) -> tuple[Array, Array]:
+        """See ``Stepper``."""
+        bodies = self.bodies
+        angle, zero = np.array([body.angle for body in bodies]), np.zeros(len(bodies))
+        turn = np.zeros((len(bodies), 3, 3))
+        turn[:, 0, 0] = turn[:, 1, 1] = np.cos(angle)
+        turn[:, 1, 0], turn[:, 0, 1], turn[:, 2, 2] = np.sin(angle), -np.sin(angle), 1.0
+        spin = np.stack([zero, zero, np.array([body.angular_velocity for body in bodies])], axis=-1)
+        return _landmarks(
+            np.array([(*body.position, 0.0) for body in bodies]),
+            turn,
+            np.array([(*body.velocity, 0.0) for body in bodies]),
+            spin,
+        )
+
+
+def _planar_space(scene: sy.Scene) -> tuple[pymunk.Space, list[pymunk.Body]]:
+    """A space with the scene's bodies; friction and restitution, which multiply, are those of the ground."""
+    space = pymunk.Space()
+    space.gravity = scene.gravity[:2]
+    (ground,) = scene.of(sy.Ground)
+    floor = pymunk.Segment(space.static_body, (-100, -1), (100, -1), 1.0)
+    shapes: list[pymunk.Shape] = [floor]
+    space.add(floor)
+    bodies = []
+    for body in scene.bodies:
+        (part,) = body.parts
+        moment = float(np.asarray(body.inertia)[2, 2])
+        own = pymunk.Body(body.mass, moment)
+        own.position, own.velocity = body.position[:2], body.velocity[:2]
+        if isinstance(part.shape, sy.Sphere):
+            shape: pymunk.Shape = pymunk.Circle(own, part.shape.radius)
+        else:
+            shape = pymunk.Poly.create_box(
+                own, (2 * part.shape.half_size[0], 2 * part.shape.half_size[1])
+            )
+        shapes.append(shape)
+        space.add(own, shape)
+        bodies.append(own)
+    for shape in shapes:
+        shape.friction, shape.elasticity = math.sqrt(ground.friction), math.sqrt(ground.restitution)
+    return space, bodies
+
+
+def pymunk_bodies(scene: sy.Scene) -> dict[str, Peer]:
+    """The peer of a planar scene of balls and boxes."""
+    return {"pymunk": lambda dt: PymunkBodies(scene, dt)}

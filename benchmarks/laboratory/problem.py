@@ -80,6 +80,7 @@ class Problem:
         best: Name of a method that follows the motion, for tests.
         wrong: What a defective engine would do, by the defect: scenes that differ from the true one
             by it. The measures must tell each from the true motion.
+        follows: Error within which the best method follows at the least step.
     """
 
     name: str
@@ -95,6 +96,7 @@ class Problem:
     omitted: Mapping[str, str] = field(default_factory=dict)
     best: str
     wrong: Mapping[str, Callable[[], sy.Scene]]
+    follows: float = 3e-4
 
     @property
     def times(self) -> Array:

@@ -28,15 +28,19 @@ from .integrators.rk4 import RungeKutta4
 from .integrators.rotor import parts_of
 from .integrators.symplectic_euler import SymplecticEuler
 from .math.pointers import LANES
-from .methods import Method
+from .methods import Method, joined_or_touching
 from .scene.contacts import Collisions, Ground, LinePlatform
 from .scene.forces import AnchoredBungee, Bungee, Buoyancy, Drag
+from .scene.joints import JOINTS
 from .scene.links import Cable, CableConstraint
 from .scene.rider import Rider
 from .scene.scene import CONTACTS, LINKS, SPRINGS, Scene
 from .solvers.base import Solver
 from .solvers.direct import Direct
 from .solvers.gauss_seidel import GaussSeidel
+from .solvers.proximal_newton import ProximalNewton
+from .solvers.soft_step import SoftStep
+from .solvers.swept_bodies import SweptBodies
 from .solvers.worst_first import WorstFirst
 from .solvers.xpbd import Xpbd
 
@@ -129,6 +133,12 @@ CANDIDATES = (
     Candidate("symplectic Euler, direct", SymplecticEuler(), Direct()),
     Candidate("XPBD x 20", SymplecticEuler(), Xpbd(substeps=20)),
     Candidate("explicit Euler, worst first", ExplicitEuler(), WorstFirst()),
+    Candidate("bodies, proximal Newton", Rattle(), ProximalNewton()),
+    Candidate("bodies, Gauss-Seidel x 10", Rattle(), SweptBodies(passes=10)),
+    Candidate("bodies, Gauss-Seidel x 30", Rattle(), SweptBodies(passes=30)),
+    Candidate("bodies, worst first", Rattle(), SweptBodies(passes=2, worst=True)),
+    Candidate("bodies, soft step x 4", Rattle(), SoftStep(substeps=4)),
+    Candidate("bodies, soft step x 8", Rattle(), SoftStep(substeps=8)),
 )
 
 
@@ -144,8 +154,11 @@ def candidates(scene: Scene) -> Iterator[Candidate]:
     """The candidates that can step a scene; with a solver, or with events resolved, only where there may be any."""
     impacts = bool(scene.of(Cable, CableConstraint, Ground, LinePlatform, Collisions))
     kinks = bool(scene.of(Bungee, AnchoredBungee, Buoyancy))
-    held = bool(scene.of(*LINKS, *CONTACTS, Rider))
+    held = bool(scene.of(*LINKS, *CONTACTS, Rider, *JOINTS))
+    bodies = joined_or_touching(scene)
     for candidate in CANDIDATES:
+        if bodies != (candidate.solver is not None and candidate.solver.rigid):
+            continue
         holds = candidate.solver is not None or candidate.integrator.holds_links
         dividing = kinks if candidate.integrator.smooth else impacts
         if held == holds and (dividing or not candidate.integrator.splits):

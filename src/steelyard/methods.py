@@ -75,7 +75,7 @@ class Method:
 
     def for_scene(self, scene: Scene) -> Method:
         """The method as a scene needs it: where bodies touch or are joined, with the solver's form for these."""
-        if self.solver is None or not _joined_or_touching(scene):
+        if self.solver is None or not joined_or_touching(scene):
             return self
         return replace(self, solver=self.solver.for_bodies)
 
@@ -257,7 +257,7 @@ DEFAULT = Method(Rattle(), Direct())
 DEFAULT_RIGID = Method(Rattle(), ProximalNewton())
 
 
-def _joined_or_touching(scene: Scene) -> bool:
+def joined_or_touching(scene: Scene) -> bool:
     """Whether there are joints, or bodies that touch something."""
     touching = any(scene.bodies_at(contact) for contact in scene.of(Ground, Collisions))
     return touching or bool(scene.of(*JOINTS))
@@ -265,7 +265,7 @@ def _joined_or_touching(scene: Scene) -> bool:
 
 def default_for(scene: Scene) -> Method:
     """The method of a world that is given none."""
-    return DEFAULT_RIGID if _joined_or_touching(scene) else DEFAULT
+    return DEFAULT_RIGID if joined_or_touching(scene) else DEFAULT
 
 
 __all__ = [

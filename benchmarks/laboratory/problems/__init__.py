@@ -22,6 +22,7 @@ NAMES = (
     "cloth",
     "collision",
     "bouncing_ball",
+    "contact",
 )
 
 
