@@ -15,7 +15,7 @@ from pathlib import Path
 
 from benchmarks.run import table, use_one_core
 
-MAPS = ("springs", "chains", "iterations")
+MAPS = ("springs", "chains", "iterations", "bodies")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
