@@ -32,6 +32,7 @@ def measured() -> dict[str, list[tuple[float, ...]]]:
             scene = problem.scene()
             if scene.of(sy.ContactGenerator):
                 continue
+            contacts = sy.contacts_at_a_time(scene, problem.duration)
             for candidate in methods.able(problem, scene):
                 kinked = candidate.integrator.divisions > 0 and candidate.solver is None
                 events = sy.kinks_per_second(scene, problem.duration) if kinked else 0.0
@@ -41,7 +42,7 @@ def measured() -> dict[str, list[tuple[float, ...]]]:
                     alike = point["method"] == candidate.name and point["worlds"] > 1
                     if alike and point["per_second"]:
                         dt = point["dt"]
-                        work = candidate.work(scene, model, dt)
+                        work = candidate.work(scene, model, dt, contacts)
                         cost = point["per_second"] * dt / candidate.runs(events * dt)
                         costs.setdefault(work, []).append(cost)
                 for work, found_costs in costs.items():
@@ -65,7 +66,7 @@ def main() -> None:
     payload = {
         "source": "python -m benchmarks.laboratory.costs, from benchmarks/results/charts",
         "units": "us per step and world: constant, per particle, per word on the tape, per spring, per drag, "
-        "per part of a body's turn, per KiB of scratch that the nearest cache does not hold",
+        "per part of a body's turn, per KiB of scratch that the nearest cache does not hold, per contact of bodies",
         "coefficients": {name: coefficients for name, (coefficients, _) in fits.items()},
         "relative_error": {name: error for name, (_, error) in fits.items()},
     }

@@ -1,7 +1,13 @@
 """Steelyard: a batched physics engine that lets you weigh speed against accuracy."""
 
 from . import draw, extension, scenes
-from .candidates import CANDIDATES, Candidate, candidates, kinks_per_second
+from .candidates import (
+    CANDIDATES,
+    Candidate,
+    candidates,
+    contacts_at_a_time,
+    kinks_per_second,
+)
 from .choice import Choice, Considered, choose_method
 from .diagnostics.landmarks import landmarks
 from .integrators.backward_euler import BackwardEuler
@@ -136,6 +142,7 @@ __all__ = [
     "advance",
     "candidates",
     "choose_method",
+    "contacts_at_a_time",
     "draw",
     "extension",
     "flight",

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .candidates import Candidate, candidates, cost_table, kinks_per_second
+from .candidates import Candidate, candidates, contacts_at_a_time, cost_table, kinks_per_second
 from .diagnostics.energy import kinetic_energy
 from .diagnostics.landmarks import landmarks
 from .methods import Method
@@ -142,12 +142,13 @@ class _Runs:
         self.candidate = candidate
         self.order = max(candidate.integrator.order(), 1)
         solver = candidate.solver
-        self.exact = solver is None or solver.sparse
+        self.exact = solver is None or solver.exact
         self._scene = scene
         self._horizon = horizon
         self._since = since
-        #: Kinks that divide its steps, per second.
+        #: Kinks that divide its steps, per second; contacts of bodies at a time.
         self.events = 0.0
+        self.contacts = 0.0
         self._world: type[World] = World
         self._tracks: dict[tuple[int, int], _Track | None] = {}
         self._model = self._build(_LOOKS).model
@@ -160,7 +161,7 @@ class _Runs:
         """Expected cost [us per simulated second and world]."""
         dt = self.dt(steps)
         each = cost_table()[self.candidate.name]
-        step = sum(map(mul, each, self.candidate.work(self._scene, self._model, dt)))
+        step = sum(map(mul, each, self.candidate.work(self._scene, self._model, dt, self.contacts)))
         return step * self.candidate.runs(self.events * dt) / dt
 
     def _build(self, steps: int) -> World:
@@ -176,6 +177,11 @@ class _Runs:
         if (steps, looks) not in self._tracks:
             self._tracks[steps, looks] = self._run(steps, looks)
         return self._tracks[steps, looks]
+
+    def between(self, steps: int, track: _Track) -> float:
+        """How far a run of so many steps is from that of a step between its own and twice that."""
+        other = self.track(_LOOKS * math.ceil(0.7 * steps / _LOOKS), _LOOKS)
+        return math.inf if other is None else other.distance(track)
 
     def _run(self, steps: int, looks: int) -> _Track | None:
         # What blows up may overflow before it is flagged.
@@ -250,37 +256,36 @@ def _whole(steps: float) -> int:
     return next(whole for whole in count(least) if _down(whole) == whole)
 
 
-def _reference(runs: list[_Runs], start: int, tolerance: float) -> _Reference:
+def _reference(runs: list[_Runs], start: int, tolerance: float, *, kinked: bool) -> _Reference:
     """The run that is known best, and its error by halving the step.
 
-    Sweeps may leave an error that no step takes away, so their runs are no reference where others are.
+    Sweeps may leave an error that no step takes away, so their runs are no reference where others are. Behind kinks and
+    impacts a step between the two counts too, and an error that grows once may fall again.
     """
     trusted = [run for run in runs if run.exact] or runs
     best = _Reference(trusted[0], start, math.inf)
     # Of one order, those that resolve impacts first.
     for run in sorted(trusted, key=lambda run: (-run.order, not run.candidate.integrator.splits)):
-        steps, change = start, math.inf
+        steps, change, last = start, math.inf, math.inf
         before = run.track(steps, _LOOKS)
         while 2 * steps <= _MOST:
             steps *= 2
             finer = run.track(steps, _LOOKS)
             if finer is not None and before is not None:
-                last, change = change, finer.distance(before)
+                earlier, last, change = last, change, finer.distance(before)
+                if kinked and change < best.error:
+                    change = max(change, run.between(steps, finer))
                 # What is left of a method of first order, and more than that of others.
                 if change < best.error:
                     best = _Reference(run, steps, change)
-                if change <= _REFERENCE * tolerance and _confirmed(run, steps, finer, tolerance):
+                near = _REFERENCE * tolerance
+                # Impacts may fall alike in a step and in its half.
+                if change <= near and run.between(steps, finer) <= 2.0 * near:
                     return best
-                if change > 0.9 * last:
+                if change > 0.9 * (max(earlier, last) if kinked else last):
                     break
             before = finer
     return best
-
-
-def _confirmed(run: _Runs, steps: int, track: _Track, tolerance: float) -> bool:
-    """Whether a step between the last two gives the same: impacts may fall alike in a step and in its half."""
-    between = run.track(_LOOKS * math.ceil(0.7 * steps / _LOOKS), _LOOKS)
-    return between is not None and between.distance(track) <= 2.0 * _REFERENCE * tolerance
 
 
 def _smallest(
@@ -378,8 +383,11 @@ def choose_method(
         events = kinks_per_second(scene, span)
         for run in runs:
             run.events = events if run.candidate.solver is None else 0.0
+    contacts = contacts_at_a_time(scene, span)
+    for run in runs:
+        run.contacts = contacts
     margin = _KINKED if scene.of(*_KINKS) else _SMOOTH
-    reference = _reference(runs, start, allowed)
+    reference = _reference(runs, start, allowed, kinked=margin is _KINKED)
     found: list[Considered] = []
     best, limit = reference.error, math.inf
     if reference.error <= 0.5 * allowed:

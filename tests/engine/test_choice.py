@@ -176,3 +176,41 @@ def test_any_number_of_steps_is_compared_with_the_reference(steps: int) -> None:
     assert steps <= whole <= 1.05 * steps
     assert whole % looks == 0 and 20 <= looks < 40
     assert choice._down(whole) == whole
+
+
+def stack(top: float) -> sy.Scene:
+    """Four boxes, the last so many times as heavy."""
+    scene = sy.Scene()
+    for i in range(4):
+        part = sy.Part(shape=sy.Box((0.5, 0.5, 0.5)), density=1000.0 * (top if i == 3 else 1.0))
+        scene.add(sy.Body(position=(0, 0.5 + i, 0), parts=part))
+    scene.add(sy.Ground(friction=0.6))
+    scene.add(sy.Collisions(friction=0.6))
+    return scene
+
+
+def test_bodies_that_touch_get_a_solver_that_holds_them() -> None:
+    choice = sy.choose_method(stack(300.0), tolerance=1e-5, horizon=1.0)
+    assert choice.considered[0].name == "bodies, proximal Newton"
+    verdicts = {entry.name: entry for entry in choice.considered}
+    assert verdicts["bodies, Gauss-Seidel x 10"].dt is None
+    world = sy.World(stack(300.0), tolerance=1e-5)
+    world.step(round(1.0 / world.method.dt))
+    np.testing.assert_allclose(world.bodies.position[0, :, 1], [0.5, 1.5, 2.5, 3.5], atol=1e-5)
+
+
+def test_impacts_of_bodies_are_known_to_no_more_than_steps_can_tell() -> None:
+    """Impacts may fall alike in a step and in its half: that is no proof of either."""
+    scene = sy.Scene()
+    scene.add(sy.Body(position=(0, 1.5, 0), parts=sy.Sphere(0.5)))
+    scene.add(sy.Ground(restitution=0.8))
+    choice = sy.choose_method(scene, tolerance=1e-2, horizon=1.0)
+    world = sy.World(scene, method=choice.method)
+    world.step(round(1.0 / choice.method.dt))
+    fall = math.sqrt(2.0 / 9.81)
+    speed, since = 0.8 * 9.81 * fall, 1.0 - fall
+    assert world.bodies.position[0, 0, 1] == pytest.approx(
+        0.5 + speed * since - 0.5 * 9.81 * since**2, abs=1e-2
+    )
+    with pytest.raises(ValueError, match="out of reach"):
+        sy.choose_method(scene, tolerance=1e-9, horizon=1.0)

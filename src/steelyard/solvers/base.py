@@ -16,6 +16,8 @@ class Solver:
     staged: ClassVar[bool] = True
     #: Whether it solves all constraints through one sparse matrix.
     sparse: ClassVar[bool] = False
+    #: Whether shorter steps take away all that it errs by.
+    exact: ClassVar[bool] = False
     #: Whether it holds springs and bungees as constraints that give way; else they are forces.
     compliant: ClassVar[bool] = False
 

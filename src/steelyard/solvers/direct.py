@@ -80,6 +80,7 @@ class Direct(Solver):
 
     tolerance: float = 1e-12
     passes: int = 60
+    exact: ClassVar[bool] = True
     sparse: ClassVar[bool] = True
 
     @property

@@ -22,6 +22,7 @@ Le Lidec & Montaut (2024), *From Compliant to Rigid Contact Simulation*; Acary, 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 from ..model.rigid_layout import (
     N_COMPLIANCE,
@@ -53,6 +54,7 @@ class ProximalNewton(RigidSolver):
     tolerance: float = 1e-9
     passes: int = 6
     iterations: int = 60
+    exact: ClassVar[bool] = True
 
     @property
     def own_settings(self) -> dict[int, float]:
