@@ -235,6 +235,7 @@ def _heap(quick: bool) -> tuple[Any, list[Figure]]:
 def draw_heap(found: Measured, path: Path) -> None:
     """Cost against penetration and against the gain of energy, of every method and step."""
     import matplotlib.pyplot as plt
+    from matplotlib.ticker import NullFormatter
 
     figure, panels = plt.subplots(1, 2, figsize=(12.5, 4.6))
     families = list(dict.fromkeys(name.rpartition(", dt ")[0] for name in found))
@@ -252,7 +253,7 @@ def draw_heap(found: Measured, path: Path) -> None:
             )
     for panel, label in zip(
         panels,
-        ("deepest penetration [m]", "largest gain of energy between looks [share of the fall]"),
+        ("deepest penetration", "largest gain of energy between looks [share of the fall]"),
         strict=True,
     ):
         panel.set_xscale("log")
@@ -260,6 +261,11 @@ def draw_heap(found: Measured, path: Path) -> None:
         panel.set_xlabel(label)
         panel.set_ylabel("CPU time per simulated second\nand world [ms]")
         panel.grid(visible=True, which="major", alpha=0.3)
+        for axis in (panel.xaxis, panel.yaxis):
+            axis.set_minor_formatter(NullFormatter())
+    panels[0].set_xticks([0.02, 0.05, 0.1, 0.2], ["2 cm", "5 cm", "10 cm", "20 cm"])
+    for panel in panels:
+        panel.set_yticks([2, 5, 10, 20], ["2", "5", "10", "20"])
     panels[1].legend(loc="center left", bbox_to_anchor=(1.02, 0.5), frameon=False)
     figure.suptitle(
         "Ten boxes and ten balls fall and come to rest: down and left is better", x=0.01, ha="left"
