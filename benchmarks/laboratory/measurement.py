@@ -83,7 +83,7 @@ def measure(problem: Problem, *, quick: bool = False) -> list[Point]:
         first()
         single = max(time.process_time() - start, 1e-6)
         if not peer:
-            most = 16 if quick else min(WORLDS, max(FEWEST, 8 * int(MOST / single)))
+            most = 8 if quick else min(WORLDS, max(FEWEST, 8 * int(MOST / single)))
             rounds = max(1, math.ceil(LEAST / (single * most / 8)))
             timed = build(worlds=most, rounds=rounds)
             runs[f"{name} {dt!r}"] = (_point(name, dt, peer, most, errors), timed)

@@ -54,7 +54,7 @@ from ..model.tape import H_UNSETTLED
 from .block_cholesky import SIX
 from .islands import UNSEEN, gather_island, join_all
 from .rigid_newton import contact_at, contact_ends, impulse_at, minimise
-from .rigid_sweeps import settle_contact, sweep_island
+from .rigid_sweeps import sweep_island
 
 # Compliance of the fallback, which is solved once, and of the push, over the mobility of a contact.
 _SOFT, _PUSH = 1e-4, 1e-3
@@ -183,12 +183,6 @@ def _solve_island(tape, s, n, rigid, size, contacts, joints, rows, what):
     if change <= _AT_REST:
         _keep_last(tape, s, n, rigid, contacts, joints)
         return True
-    if contacts == 1 and joints == 0:
-        if settle_contact(tape, s, n, rigid):
-            return True
-        c = contact_at(tape, rigid, n[tape[rigid + LIST]])
-        s[c + C_COMPLIANCE] = numbers[N_COMPLIANCE] * s[c + C_WEIGHT]
-        _begin_velocity(tape, s, n, rigid, size, contacts, joints, True)
     moved = False
     settled = False
     for _ in range(int(numbers[N_PASSES])):

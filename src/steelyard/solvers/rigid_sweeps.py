@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from math import sqrt
 
-from ..constraints.contact_rows import length, relative_velocity, world_vector
+from ..constraints.contact_rows import relative_velocity, world_vector
 from ..constraints.joint_rows import joint_at, joint_solids, row_at, row_velocity
 from ..constraints.solids import symmetric_times
 from ..kernel import inner
@@ -49,9 +49,6 @@ from ..model.rigid_layout import (
     S_VELOCITY,
 )
 from .rigid_newton import contact_at, contact_ends
-
-# Sweeps of a single contact, and the change, over its impulse, at which it stands still.
-_SETTLING, _SETTLED = 40, 4e-16
 
 
 @inner
@@ -230,24 +227,6 @@ def _mend_worst(tape, s, n, rigid, contacts, joints):
         a, b = joint_solids(tape, rigid, joint_at(tape, rigid, found))
         _sweep_row(s, found_row, a, b)
     return contact >= 0 or found >= 0
-
-
-@inner
-def settle_contact(tape, s, n, rigid):
-    """Sweep an island's only contact until its impulse stands still: Coulomb's law to rounding; whether it did."""
-    i = n[tape[rigid + LIST]]
-    c = contact_at(tape, rigid, i)
-    a, b = contact_ends(tape, n, rigid, i)
-    s[c + C_COMPLIANCE] = 0.0
-    _begin(tape, s, n, rigid, 1, 0)
-    for _ in range(_SETTLING):
-        l0, l1, l2 = s[c + C_IMPULSE], s[c + C_IMPULSE + 1], s[c + C_IMPULSE + 2]
-        _sweep_contact(s, c, a, b)
-        change = length(s[c + C_IMPULSE] - l0, s[c + C_IMPULSE + 1] - l1, s[c + C_IMPULSE + 2] - l2)
-        size = length(s[c + C_IMPULSE], s[c + C_IMPULSE + 1], s[c + C_IMPULSE + 2])
-        if change <= _SETTLED * size:
-            return True
-    return False
 
 
 @inner
