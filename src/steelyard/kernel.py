@@ -12,12 +12,14 @@ from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, ClassVar
 
 import numba
+from numba.core import typed_passes, untyped_passes
 from numba.core.caching import IndexDataCacheFile
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
+from numba.core.compiler_machinery import PassManager
 
 _PACKAGE = Path(__file__).resolve().parent
 
@@ -82,8 +84,36 @@ class _Ingredient(JITCodeLibrary):
 
 
 class _IngredientCompiler(Compiler):
+    #: Passes of numba's that find nothing in kernels: these have no closures, literals, ``with`` or ``raise``.
+    idle: ClassVar[set[type]] = {
+        untyped_passes.WithLifting,
+        untyped_passes.InlineClosureLikes,
+        untyped_passes.RewriteSemanticConstants,
+        untyped_passes.DeadBranchPrune,
+        untyped_passes.RewriteDynamicRaises,
+        untyped_passes.MakeFunctionToJitFunction,
+        untyped_passes.InlineInlinables,
+        untyped_passes.FindLiterallyCalls,
+        untyped_passes.LiteralUnroll,
+        untyped_passes.LiteralPropagationSubPipelinePass,
+        typed_passes.InlineOverloads,
+        typed_passes.NopythonRewrites,
+        typed_passes.NoPythonSupportedFeatureValidation,
+        typed_passes.DumpParforDiagnostics,
+    }
+
     def __init__(self, typing: Any, target: Any, library: Any, *rest: Any) -> None:
         super().__init__(typing, target, library or _Ingredient(target.codegen(), "inner"), *rest)
+
+    def define_pipelines(self) -> list[Any]:
+        """Numba's own pipeline, without what would look in vain."""
+        (every,) = super().define_pipelines()
+        some = PassManager(every.pipeline_name)
+        for step, words in every.passes:
+            if step not in self.idle:
+                some.add_pass(step, words)
+        some.finalize()
+        return [some]
 
 
 def inner(function: Callable[..., Any]) -> Any:

@@ -13,13 +13,31 @@ from ..model.rigid_layout import (
     C_PLACE,
     C_TANGENT,
     C_WEIGHT,
+    CONTACT_ENTRIES,
+    CONTACT_WORK,
+    END_A,
+    END_B,
     S_INVERSE,
     S_INVERSE_INERTIA,
     S_MOVES,
     S_PLACE,
     S_TURNS,
 )
-from .solids import symmetric_times
+from .solids import solid_at, symmetric_times
+
+
+@inner
+def contact_at(tape, rigid, i):
+    """First entry of a contact's work."""
+    return tape[rigid + CONTACT_WORK] + CONTACT_ENTRIES * i
+
+
+@inner
+def contact_ends(tape, n, rigid, i):
+    """Work of the solids of a contact; -1 for scenery."""
+    b = n[tape[rigid + END_B] + i]
+    a = solid_at(tape, rigid, n[tape[rigid + END_A] + i])
+    return a, solid_at(tape, rigid, b) if b >= 0 else -1
 
 
 @inner

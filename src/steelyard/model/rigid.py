@@ -266,6 +266,7 @@ class Rigid:
         words[at.JOINTS] = len(self.joints)
         words[at.REST_ROW] = c.model.places.get((RIGID, "rest"), (-1, 0))[0]
         words[at.WAKERS] = wakers
+        words[at.SOLVE] = c.method.solver.island.address(planar=c.scene.planar)  # type: ignore[union-attr]
         words[at.BOUND_ROW] = c.model.places[RIGID, "bound"][0]
         words[at.ROW_WORK] = entries(at.ROW_ENTRIES * sum(map(_rows, self.joints)))
         words[at.FRAME_WORK] = entries(at.FRAME_ENTRIES)
@@ -283,6 +284,7 @@ class Rigid:
             (at.DEGREES, solids + 1), (at.ADJACENT, 2 * bonds), (at.ORDER, solids), (at.LOCAL, solids),
             (at.FIRST, solids), (at.STARTS, solids), (at.END_A, bonds), (at.END_B, bonds),
             (at.LIST, capacity), (at.MATCHED, capacity), (at.HELD, len(self.joints)),
+            (at.ISLAND, at.ISLAND_ENTRIES),
         ):  # fmt: skip
             words[word] = place
             place += size

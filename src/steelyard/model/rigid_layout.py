@@ -11,9 +11,12 @@ from __future__ import annotations
 (
     SOLIDS, SOLID_RECORDS, COLLIDERS, COLLIDER_RECORDS, PAIRS, PAIR_RECORDS, NUMBERS, STORED_ROW, CAPACITY,
     OVERFLOW_ROW, START_ROW, SOLID_WORK, PLACED_WORK, CONTACT_WORK, POINTS_WORK, NARROW_WORK, MATRIX_ROW, VECTOR_ROW,
-    JOINTS, JOINT_RECORDS, ROW_WORK, FRAME_WORK, BOUND_ROW, PACK_ROW, REST_ROW, WAKERS, WAKER_RECORDS,
-    DEGREES, ADJACENT, ORDER, LOCAL, FIRST, STARTS, END_A, END_B, LIST, MATCHED, HELD, RIGID_WORDS,
-) = range(39)  # fmt: skip
+    JOINTS, JOINT_RECORDS, ROW_WORK, FRAME_WORK, BOUND_ROW, PACK_ROW, REST_ROW, WAKERS, WAKER_RECORDS, SOLVE,
+    DEGREES, ADJACENT, ORDER, LOCAL, FIRST, STARTS, END_A, END_B, LIST, MATCHED, HELD, ISLAND, RIGID_WORDS,
+) = range(41)  # fmt: skip
+
+# The island at hand: numbers of solids, contacts, joints and the factor's rows, and whether the solve settled.
+SETTLED, ISLAND_ENTRIES = 4, 5
 
 # Record of a solid (body or particle): rows of position, orientation, velocity, angular momentum, inverse mass, inertia
 # and its inverse, -1 where it has none; whether it moves (1) and turns (2); rows of its constant acceleration.

@@ -16,7 +16,13 @@ from __future__ import annotations
 
 from math import sqrt
 
-from ..constraints.contact_rows import accelerate, add_impulse, relative_velocity
+from ..constraints.contact_rows import (
+    accelerate,
+    add_impulse,
+    contact_at,
+    contact_ends,
+    relative_velocity,
+)
 from ..constraints.solids import solid_at, symmetric_times
 from ..kernel import inner
 from ..math.pointers import LANES
@@ -39,7 +45,6 @@ from ..model.rigid_layout import (
     SOLIDS,
     START_ROW,
 )
-from .rigid_newton import contact_at, contact_ends
 from .rigid_sweeps import mobility_along
 
 # What does not act in the velocity stage wants less than this.

@@ -16,6 +16,7 @@ from ..model.rigid_layout import (
     END_B,
     FIRST,
     HELD,
+    ISLAND,
     JOINTS,
     LIST,
     LOCAL,
@@ -106,10 +107,8 @@ def visit(tape, n, rigid, seed, mark):
 def gather_island(tape, n, rigid, seed, count):
     """The island of a solid: its solids in order of elimination, contacts, joints, and the factor's envelope.
 
-    Bonds from ``count`` on are joints.
-
-    Returns:
-        Numbers of solids, contacts and joints; the factor's rows.
+    Bonds from ``count`` on are joints. Numbers of solids, contacts and joints and the factor's rows become those of the
+    island at hand.
     """
     order = tape[rigid + ORDER]
     local = tape[rigid + LOCAL]
@@ -146,4 +145,8 @@ def gather_island(tape, n, rigid, seed, count):
     for i in range(size):
         n[tape[rigid + STARTS] + i] = rows
         rows += SIX * (i - n[first + i] + 1)
-    return size, contacts, joints, rows
+    island = tape[rigid + ISLAND]
+    n[island] = size
+    n[island + 1] = contacts
+    n[island + 2] = joints
+    n[island + 3] = rows

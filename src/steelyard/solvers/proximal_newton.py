@@ -32,6 +32,8 @@ from ..model.rigid_layout import (
     N_SHIFT,
     N_TOLERANCE,
 )
+from ..stage import Stage
+from .proximal_passes import pass_island
 from .rigid_stages import RigidSolver
 
 
@@ -55,6 +57,11 @@ class ProximalNewton(RigidSolver):
     passes: int = 6
     iterations: int = 60
     exact: ClassVar[bool] = True
+
+    @property
+    def island(self) -> Stage:
+        """Proximal passes."""
+        return pass_island
 
     @property
     def own_settings(self) -> dict[int, float]:

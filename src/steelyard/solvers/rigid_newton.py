@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from math import sqrt
 
-from ..constraints.contact_rows import add_impulse, relative_velocity
+from ..constraints.contact_rows import add_impulse, contact_at, contact_ends, relative_velocity
 from ..constraints.joint_rows import (
     add_row_impulse,
     joint_at,
@@ -36,8 +36,6 @@ from ..model.rigid_layout import (
     C_SHIFT,
     C_SPEED,
     C_TANGENT,
-    CONTACT_ENTRIES,
-    CONTACT_WORK,
     END_A,
     END_B,
     FIRST,
@@ -80,20 +78,6 @@ _UNTOUCHED = 0.01
 _FLAT = 1e-3
 # Residual that rounding may leave where no step lessens it.
 _ROUNDING = 1e-6
-
-
-@inner
-def contact_at(tape, rigid, i):
-    """First entry of a contact's work."""
-    return tape[rigid + CONTACT_WORK] + CONTACT_ENTRIES * i
-
-
-@inner
-def contact_ends(tape, n, rigid, i):
-    """Work of the solids of a contact; -1 for scenery."""
-    b = n[tape[rigid + END_B] + i]
-    a = solid_at(tape, rigid, n[tape[rigid + END_A] + i])
-    return a, solid_at(tape, rigid, b) if b >= 0 else -1
 
 
 @inner

@@ -17,7 +17,7 @@ from ..collision.contact_list import (
     place_colliders,
     prepare_contacts,
 )
-from ..constraints.contact_rows import relative_velocity, world_vector
+from ..constraints.contact_rows import contact_at, contact_ends, relative_velocity, world_vector
 from ..constraints.joints import (
     POSITIONS,
     PUSHES,
@@ -81,7 +81,6 @@ from .base import Solver
 from .blows import pass_blows, start_velocities
 from .joint_closing import close_over_step, drift_as_solved, join_again
 from .rigid_islands import ALL, PUSH, solve_islands
-from .rigid_newton import contact_at, contact_ends
 from .sleep import (
     all_asleep,
     fall_asleep,
@@ -148,6 +147,11 @@ class RigidSolver(Solver):
             **self.own_settings,
         }
         return tuple(given.get(k, 0.0) for k in range(SETTINGS))
+
+    @property
+    def island(self) -> Stage:
+        """What solves an island; part 0 for all impulses, 1 for changes, 2 for a push."""
+        raise NotImplementedError
 
     @property
     def start(self) -> Stage:

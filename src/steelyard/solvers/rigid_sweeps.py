@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from math import sqrt
 
-from ..constraints.contact_rows import relative_velocity, world_vector
+from ..constraints.contact_rows import contact_at, contact_ends, relative_velocity, world_vector
 from ..constraints.joint_rows import joint_at, joint_solids, row_at, row_velocity
 from ..constraints.solids import symmetric_times
 from ..kernel import inner
@@ -27,6 +27,7 @@ from ..model.rigid_layout import (
     C_NORMAL,
     C_TANGENT,
     HELD,
+    ISLAND,
     J_BEFORE,
     J_COMPLIANCE,
     J_FORCE,
@@ -47,8 +48,11 @@ from ..model.rigid_layout import (
     S_INVERSE,
     S_INVERSE_INERTIA,
     S_VELOCITY,
+    SETTLED,
 )
-from .rigid_newton import contact_at, contact_ends
+from ..model.tape import H_RIGID
+from ..stage import stage
+from .rigid_islands import PUSH, begin_velocity, forget_impulses, island_at_hand
 
 
 @inner
@@ -229,10 +233,15 @@ def _mend_worst(tape, s, n, rigid, contacts, joints):
     return contact >= 0 or found >= 0
 
 
-@inner
-def sweep_island(tape, s, n, rigid, contacts, joints):
-    """Impulses of an island from velocities that hold those of the stage before."""
+@stage
+def sweep_island(tape, s, n, what):
+    """The island at hand, by sweeps that begin with the impulses of the stage before, or for a push with none."""
+    rigid = tape[H_RIGID]
     numbers = doubles_at(tape[rigid + NUMBERS])
+    size, contacts, joints, _ = island_at_hand(tape, n, rigid)
+    if what == PUSH:
+        forget_impulses(tape, s, n, rigid, contacts, joints, 0.0)
+    begin_velocity(tape, s, n, rigid, size, contacts, joints, what != PUSH)
     sweeps = int(numbers[N_SWEEPS])
     _begin(tape, s, n, rigid, contacts, joints)
     if numbers[N_WORST] == 0.0:
@@ -245,3 +254,4 @@ def sweep_island(tape, s, n, rigid, contacts, joints):
             if not _mend_worst(tape, s, n, rigid, contacts, joints):
                 break
         _sweep(tape, s, n, rigid, contacts, joints)
+    n[tape[rigid + ISLAND] + SETTLED] = 1

@@ -17,7 +17,7 @@ So nobody has to tell that something was changed, and a world sleeps alike in an
 from __future__ import annotations
 
 from ..collision.manifold import IDS
-from ..constraints.contact_rows import length
+from ..constraints.contact_rows import contact_at, length
 from ..constraints.solids import is_free, rest_at, solid_at, symmetric_times
 from ..kernel import inner
 from ..math.digest import EMPTY, digest_number, mix
@@ -53,7 +53,6 @@ from ..model.rigid_layout import (
     WAKERS,
 )
 from .islands import UNSEEN, join_all, visit
-from .rigid_newton import contact_at
 
 # Digests of solids that were stopped, and will be known after the next kick.
 _STOPPED = 1.0

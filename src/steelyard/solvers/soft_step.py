@@ -13,7 +13,9 @@ from dataclasses import dataclass
 
 from ..model.rigid_layout import N_HERTZ, N_RATIO, N_SWEEPS
 from ..scene import checks
+from ..stage import Stage
 from .rigid_stages import RigidSolver
+from .rigid_sweeps import sweep_island
 
 
 @dataclass(frozen=True)
@@ -35,6 +37,11 @@ class SoftStep(RigidSolver):
         above = checks.Limit(above=0.0, remedy="Use 30 hertz and a ratio of 10.")
         checks.number("SoftStep", "hertz", self.hertz, above)
         checks.number("SoftStep", "ratio", self.ratio, above)
+
+    @property
+    def island(self) -> Stage:
+        """Sweeps."""
+        return sweep_island
 
     @property
     def own_settings(self) -> dict[int, float]:

@@ -5,7 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..model.rigid_layout import N_SWEEPS, N_WORST
+from ..stage import Stage
 from .rigid_stages import RigidSolver
+from .rigid_sweeps import sweep_island
 
 
 @dataclass(frozen=True)
@@ -22,6 +24,11 @@ class SweptBodies(RigidSolver):
     passes: int = 20
     worst: bool = False
     per_row: bool = True
+
+    @property
+    def island(self) -> Stage:
+        """Sweeps."""
+        return sweep_island
 
     @property
     def own_settings(self) -> dict[int, float]:
