@@ -16,7 +16,7 @@ from numba import types
 from numba.core.ccallback import CFunc
 from numba.core.extending import intrinsic
 
-from .kernel import OPTIONS, stamp
+from .kernel import OPTIONS, KernelCompiler, stamp
 from .math.pointers import Doubles, Integers, PlanarDoubles, Tape
 
 
@@ -41,7 +41,9 @@ class Stage:
         if planar not in self._compiled:
             scratch = PlanarDoubles if planar else Doubles
             arguments = tuple(scratch if a == Doubles else a for a in self._arguments)
-            compiled: Any = CFunc(self._function, (arguments, types.void), {}, OPTIONS)
+            compiled: Any = CFunc(
+                self._function, (arguments, types.void), {}, OPTIONS, pipeline_class=KernelCompiler
+            )
             compiled.enable_caching()
             stamp(compiled._cache, self._function)
             compiled.compile()

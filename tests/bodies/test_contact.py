@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.optimize import linprog
 
 import steelyard as sy
 
@@ -572,3 +573,88 @@ def test_a_house_of_seven_cards_stands():
     assert moved < 1e-5
     assert np.abs(world.bodies.velocity).max() < 1e-9
     assert world.bodies.position[0, :, 1].max() > 2.4 * LONG
+
+
+# Arches
+
+
+def voussoirs(count, thickness, wide=0.5):
+    """A half circle of mean radius 1 of equal wedges, each two slabs along its joints, on the ground.
+
+    Returns:
+        The scene; places of inner and outer ends of the joints (count + 1, 2, 2) and of centres of mass (count, 2).
+    """
+    scene = sy.Scene()
+    half = math.pi / (2 * count)
+    inner, outer = 1 - thickness / 2, 1 + thickness / 2
+    slab = 0.3 * inner * half
+    centres = []
+    for i in range(count):
+        middle = (2 * i + 1) * half
+        parts = []
+        for side in (-1, 1):
+            along = np.array((math.cos(side * half), math.sin(side * half)))
+            across = side * np.array((-along[1], along[0]))
+            parts.append(
+                sy.Part(
+                    shape=sy.Box((thickness / 2, slab, wide)),
+                    offset=(*(along - slab * across), 0.0),
+                    orientation=(math.cos(side * half / 2), 0, 0, math.sin(side * half / 2)),
+                )
+            )
+        # Both parts weigh the same: the centre of mass is midway.
+        centre = np.mean([part.offset[0] for part in parts]) * np.array(
+            (math.cos(middle), math.sin(middle))
+        )
+        turn = (math.cos(middle / 2), 0, 0, math.sin(middle / 2))
+        scene.add(sy.Body(position=(*centre, 0.0), orientation=turn, parts=parts))
+        centres.append(centre)
+    angles = 2 * half * np.arange(count + 1)
+    ways = np.stack((np.cos(angles), np.sin(angles)), axis=-1)
+    return scene, np.stack((inner * ways, outer * ways), axis=1), np.array(centres)
+
+
+def can_stand(joints, centres, friction):
+    """Whether forces at the ends of the joints, within friction, can bear equal blocks: by linear programming."""
+    count = len(centres)
+    # Unknown are the pushes at both ends of each joint, and the friction along it, on the block behind it.
+    balance, load = np.zeros((3 * count, 3 * (count + 1))), np.tile((0.0, 1.0, 0.0), count)
+    limits = np.zeros((2 * (count + 1), 3 * (count + 1)))
+    for j, ends in enumerate(joints):
+        radial = ends[1] - ends[0]
+        radial /= np.linalg.norm(radial)
+        push = np.array((-radial[1], radial[0]))
+        for block, sign in ((j, 1.0), (j - 1, -1.0)):
+            if 0 <= block < count:
+                for k, (force, place) in enumerate(
+                    ((push, ends[0]), (push, ends[1]), (radial, ends[0]))
+                ):
+                    arm = place - centres[block]
+                    column = (*force, arm[0] * force[1] - arm[1] * force[0])
+                    balance[3 * block : 3 * block + 3, 3 * j + k] = sign * np.array(column)
+        for k, sign in enumerate((1.0, -1.0)):
+            limits[2 * j + k, 3 * j : 3 * j + 3] = (-friction, -friction, sign)
+    bounds = [(0, None), (0, None), (None, None)] * (count + 1)
+    found = linprog(np.zeros(3 * (count + 1)), limits, np.zeros(len(limits)), balance, load, bounds)
+    return found.status == 0
+
+
+@pytest.mark.parametrize("count", [5, 9, 13])
+@pytest.mark.parametrize("share", [1.02, 0.98])
+def test_an_arch_stands_if_it_is_as_thick_as_statics_asks_for(count, share):
+    friction = 0.8
+    low, high = 0.01, 0.3
+    for _ in range(14):
+        middle = 0.5 * (low + high)
+        _, joints, centres = voussoirs(count, middle)
+        low, high = (low, middle) if can_stand(joints, centres, friction) else (middle, high)
+    scene, _, centres = voussoirs(count, share * high)
+    on_ground(scene, friction)
+    if share > 1.0:
+        world, _ = settled(scene, 60.0)
+        assert np.abs(world.bodies.position[0, :, :2] - centres).max() < 1e-6
+        assert np.abs(world.bodies.velocity).max() < 1e-6
+    else:
+        world = sy.World(scene)
+        world.step(1200)
+        assert world.bodies.position[0, count // 2, 1] < 0.5

@@ -70,14 +70,6 @@ def flip(m, out, count):
 
 
 @inner
-def _swap(m, out, i, j):
-    for k in range(POINT):
-        value = m[out + POINT * i + k]
-        m[out + POINT * i + k] = m[out + POINT * j + k]
-        m[out + POINT * j + k] = value
-
-
-@inner
 def _signed_area(m, out, i, j, k):
     """Twice the area of three points seen along the normal."""
     a = out + POINT * i + _PLACE
@@ -93,45 +85,40 @@ def _signed_area(m, out, i, j, k):
 
 
 @inner
-def reduce_points(m, out, count):
-    """Keep the deepest point and three that span the largest area with it; how many are left."""
-    if count <= MOST_POINTS:
-        return count
+def _deepest(m, out, count):
+    """The point that lies deeper than all others, or -1."""
     best = 0
+    second = 1e300
     for i in range(1, count):
-        if m[out + POINT * i + _GAP] < m[out + POINT * best + _GAP] - _TIE:
+        gap = m[out + POINT * i + _GAP]
+        if gap < m[out + POINT * best + _GAP]:
+            second = m[out + POINT * best + _GAP]
             best = i
-    _swap(m, out, 0, best)
-    best = 1
-    most = -1.0
-    for i in range(1, count):
-        square = 0.0
-        for k in range(3):
-            d = m[out + POINT * i + _PLACE + k] - m[out + _PLACE + k]
-            square += d * d
-        if square > most * (1.0 + _TIE):
-            most = square
-            best = i
-    _swap(m, out, 1, best)
-    best = 2
-    most = -1.0
-    for i in range(2, count):
-        area = abs(_signed_area(m, out, 0, 1, i))
-        if area > most * (1.0 + _TIE):
-            most = area
-            best = i
-    _swap(m, out, 2, best)
-    # The last one lies furthest outside the triangle of the others, whichever side that is of.
-    side = 1.0 if _signed_area(m, out, 0, 1, 2) > 0.0 else -1.0
-    best = 3
-    most = -1e300
-    for i in range(3, count):
-        beyond = max(
-            -side * _signed_area(m, out, 0, 1, i),
-            max(-side * _signed_area(m, out, 1, 2, i), -side * _signed_area(m, out, 2, 0, i)),
-        )
-        if beyond > most + _TIE * abs(most):
-            most = beyond
-            best = i
-    _swap(m, out, 3, best)
-    return MOST_POINTS
+        else:
+            second = min(second, gap)
+    return best if m[out + POINT * best + _GAP] < second - _TIE else -1
+
+
+@inner
+def reduce_points(m, out, count):
+    """Leave out corners of a polygon, those first that take least off its area, but not the deepest; how many are left.
+
+    Where edges lie on each other, rounding makes corners all along them: of these none is left.
+    Source: Visvalingam & Whyatt (1993), *Line Generalisation by Repeated Elimination of Points*.
+    """
+    deepest = _deepest(m, out, count)
+    while count > MOST_POINTS:
+        best = -1
+        least = 1e300
+        for i in range(count):
+            if i != deepest:
+                area = abs(_signed_area(m, out, (i - 1) % count, i, (i + 1) % count))
+                if area < least * (1.0 - _TIE):
+                    least = area
+                    best = i
+        count -= 1
+        for at in range(out + POINT * best, out + POINT * count):
+            m[at] = m[at + POINT]
+        if best < deepest:
+            deepest -= 1
+    return count

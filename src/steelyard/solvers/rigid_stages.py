@@ -96,8 +96,9 @@ _STIFFER, _JOINT_RATIO = 2.0, 2.0
 _SHARE, _FASTEST = 1.0, 3.0
 # A gap [m] at which a contact that carried nothing is closed all the same.
 _CLOSED = 1e-10
-# A gap [m] that nothing closes.
-_AT_REST = 1e-9
+# A gap [m] that nothing closes; and in place of what is held, that the gap was no larger when the step began.
+_AT_REST = 1e-8
+_TOUCHED = -1.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -288,6 +289,8 @@ def _position_stage(tape, s, n, rigid, k, dt):
         c = contact_at(tape, rigid, i)
         if s[c + C_EARLIER] == 0.0:
             s[c + C_HELD] = s[c + C_IMPULSE]
+        elif s[c + C_GAP] <= _AT_REST:
+            s[c + C_HELD] = _TOUCHED
     _store_contacts(tape, s, n, rigid, k, count, kept)
     store_joints(tape, s, rigid, k, dt, False)
     if not closed:
@@ -304,7 +307,11 @@ def _velocity_stage(tape, s, n, rigid, k, dt):
     for i in range(count):
         c = contact_at(tape, rigid, i)
         closed = s[c + C_GAP] <= _CLOSED or s[c + C_BEFORE] > 0.0
-        if s[c + C_HELD] > 0.0:
+        if s[c + C_HELD] == _TOUCHED:
+            # What carries nothing may drift by rounding, but must bear when it is asked to.
+            closed = closed or s[c + C_GAP] <= _AT_REST
+            s[c + C_HELD] = 0.0
+        elif s[c + C_HELD] > 0.0:
             # Closed within this step: nothing is known yet of what bears it.
             for axis in range(3):
                 s[c + C_BEFORE + axis] = 0.0
