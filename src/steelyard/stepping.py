@@ -97,22 +97,48 @@ def _load_row(s, row, source, start, picked, whole):
 
 @inner
 def _load_block(tape, s, state, given, given_rows, given_count, width, picked, whole):
-    """Copy the state of the picked worlds, and their own parameters, to the scratch."""
+    """Copy the state of the picked worlds, and their own parameters, to the scratch.
+
+    Returns:
+        The row from which on contacts were left out.
+    """
     row = 0
+    loaded = tape[H_STATE_ROWS]
     while row < tape[H_STATE_ROWS]:
         if _moves(tape, s, row):
             _load_row(s, row, state, width * row, picked, whole)
         else:
             store(s, row, splat(0.0))
         row += 1
-        row += _unused(tape, s, row)
+        left = _unused(tape, s, row)
+        if left > 0:
+            loaded = row
+            row += left
     for index in range(given_count):
         _load_row(s, given_rows[index], given, width * index, picked, whole)
+    return loaded
 
 
 @inner
-def _store_block(tape, s, state, width, picked, count, whole):
+def _forget_contacts(tape, s, loaded):
+    """Zero what lies behind the last contact of each world, in rows that were loaded or written to."""
+    rigid = tape[H_RIGID]
+    if rigid >= 0:
+        zero = splat(0.0)
+        live = splat(1.0)
+        row = tape[rigid + STORED_ROW]
+        end = row + STORED * tape[rigid + CAPACITY]
+        while row < end and (row < loaded or any_lane(live > zero)):
+            live = select(load(s, row + T_ID) > zero, live, zero)
+            for field in range(row, row + STORED):
+                store(s, field, select(live > zero, load(s, field), zero))
+            row += STORED
+
+
+@inner
+def _store_block(tape, s, state, width, picked, count, whole, loaded):
     """Copy the state of the picked worlds back, but of those that are given up."""
+    _forget_contacts(tape, s, loaded)
     given_up = load(s, tape[H_GIVEN_UP]) > splat(0.5)
     first = picked[0]
     every = not any_lane(given_up)
@@ -129,7 +155,8 @@ def _store_block(tape, s, state, width, picked, count, whole):
                     if s[tape[H_GIVEN_UP], k] < 0.5:
                         state[width * row + picked[k]] = s[row, k]
         row += 1
-        row += _unused(tape, s, row)
+        if row >= loaded:
+            row += _unused(tape, s, row)
 
 
 @inner
@@ -194,7 +221,9 @@ def _advance_blocks(launch, s, first, last, substeps, phase):
             for k in range(LANES):
                 picked[k] = LANES * block + min(k, count - 1)
             block += 1
-        _load_block(tape, s, state, given, given_rows, launch[L_GIVEN_COUNT], width, picked, whole)
+        loaded = _load_block(
+            tape, s, state, given, given_rows, launch[L_GIVEN_COUNT], width, picked, whole
+        )
         store(s, tape[H_GIVEN_UP], splat(0.0))
         skip[words + HASTY] = 1 if hasty else 0
         skip[words + COUNT] = count
@@ -202,7 +231,7 @@ def _advance_blocks(launch, s, first, last, substeps, phase):
             skip[words + FRESH] = 1 if substep == 0 else 0
             _step(tape, s, skip, phase)
         _flag_nonfinite(tape, s)
-        _store_block(tape, s, state, width, picked, count, whole)
+        _store_block(tape, s, state, width, picked, count, whole, loaded)
         if any_lane(load(s, tape[H_GIVEN_UP]) > splat(0.5)):
             for k in range(count):
                 if s[tape[H_GIVEN_UP], k] > 0.5:

@@ -8,18 +8,22 @@ one, since a point that serves two lets stacks fall.
 
 from __future__ import annotations
 
-from ..constraints.contact_rows import contact_vector, length, prepare_rows
+from ..constraints.contact_rows import contact_vector, length, prepare_rows, relative_velocity
 from ..constraints.solids import is_free, solid_at
 from ..kernel import inner
 from ..math.pointers import LANES, doubles_at
 from ..model.colliders import HALF_SPACE, PLACED, SPHERE
 from ..model.rigid_layout import (
     C_BEFORE,
+    C_COMPLIANCE,
     C_EARLIER,
     C_FRICTION,
     C_GAP,
     C_HELD,
     C_ID,
+    C_IMPULSE,
+    C_LATE,
+    C_LEAST,
     C_PLACE,
     C_REBOUND,
     C_RESTITUTION,
@@ -45,10 +49,11 @@ from ..model.rigid_layout import (
     PAIRS,
     PLACED_WORK,
     POINTS_WORK,
+    S_END,
     S_FREE,
     S_MOVES,
     S_PLACE,
-    S_ROTATION,
+    S_STEP,
     S_TURNS,
     SETTINGS,
     STORED,
@@ -63,6 +68,8 @@ from .narrow_phase import IDS, POINT, collide
 
 # Gap [m] beyond what both may move at which points are still kept: what just touches at the end must be known before.
 _SLACK = 1e-9
+# What moves less within a step, over its reach, turns no feature towards another that was not known.
+_FAR = 0.05
 # How far a point may be from a stored one of its pair to take its impulse, over the reach of its colliders.
 _NEAR = 0.25
 
@@ -71,8 +78,8 @@ _REACH, _MOVE, PLACED_ENTRIES = PLACED, PLACED + 1, PLACED + 2
 
 
 @inner
-def place_colliders(tape, s, rigid, k, dt):
-    """All colliders of lane k in the world."""
+def place_colliders(tape, s, rigid, k, dt, place, rotation):
+    """All colliders of lane k in the world, with solids as in the fields ``place`` and ``rotation``."""
     numbers = doubles_at(tape[rigid + NUMBERS])
     record = tape[rigid + COLLIDER_RECORDS]
     at = tape[rigid + PLACED_WORK]
@@ -86,13 +93,13 @@ def place_colliders(tape, s, rigid, k, dt):
         else:
             g = SETTINGS + GEOMETRY * tape[record + 2]
             solid = solid_at(tape, rigid, tape[record + 1])
-            turn = solid + S_ROTATION
+            turn = solid + rotation
             for i in range(3):
                 r0 = s[turn + 3 * i]
                 r1 = s[turn + 3 * i + 1]
                 r2 = s[turn + 3 * i + 2]
                 p = g + G_PLACE
-                s[at + i] = s[solid + S_PLACE + i] + (
+                s[at + i] = s[solid + place + i] + (
                     r0 * numbers[p] + r1 * numbers[p + 1] + r2 * numbers[p + 2]
                 )
                 for j in range(3):
@@ -110,7 +117,9 @@ def place_colliders(tape, s, rigid, k, dt):
             speed = s[solid + S_MOVES] * length(s[v], s[v + 1], s[v + 2])
             if s[solid + S_TURNS] != 0.0:
                 arm = reach + length(
-                    s[at] - s[solid], s[at + 1] - s[solid + 1], s[at + 2] - s[solid + 2]
+                    s[at] - s[solid + place],
+                    s[at + 1] - s[solid + place + 1],
+                    s[at + 2] - s[solid + place + 2],
                 )
                 speed += arm * length(s[v + 3], s[v + 4], s[v + 5])
             s[at + _MOVE] = speed * dt
@@ -148,6 +157,63 @@ def _apart(s, kind, a, b, margin):
 
 
 @inner
+def is_fast(tape, s, rigid):
+    """Whether a collider may move far within the step, over its reach."""
+    at = tape[rigid + PLACED_WORK]
+    for _ in range(tape[rigid + COLLIDERS]):
+        if s[at + _MOVE] > _FAR * s[at + _REACH]:
+            return True
+        at += PLACED_ENTRIES
+    return False
+
+
+@inner
+def _pair_solids(tape, s, rigid, pair):
+    """Solids of a pair, of which the second is -1 where nothing moves it, and whether something moves one of them."""
+    record = tape[rigid + PAIR_RECORDS] + PAIR * pair
+    colliders = tape[rigid + COLLIDER_RECORDS]
+    one = tape[colliders + COLLIDER * tape[record] + 1]
+    other = _movable(tape, s, rigid, tape[colliders + COLLIDER * tape[record + 1] + 1])
+    return one, other, other >= 0 or _movable(tape, s, rigid, one) >= 0
+
+
+@inner
+def _collide_pair(tape, s, rigid, pair, within, moves):
+    """Write the points of a pair; how many.
+
+    Args:
+        within: largest gap [m].
+        moves: 1.0 to add what both may move within the step, else 0.0.
+    """
+    record = tape[rigid + PAIR_RECORDS] + PAIR * pair
+    placed = tape[rigid + PLACED_WORK]
+    colliders = tape[rigid + COLLIDER_RECORDS]
+    a = placed + PLACED_ENTRIES * tape[record]
+    b = placed + PLACED_ENTRIES * tape[record + 1]
+    kind_b = tape[colliders + COLLIDER * tape[record + 1]]
+    margin = within + moves * (s[a + _MOVE] + s[b + _MOVE])
+    if _apart(s, kind_b, a, b, margin):
+        return 0
+    kind_a = tape[colliders + COLLIDER * tape[record]]
+    points = tape[rigid + POINTS_WORK]
+    return collide(s, kind_a, a, kind_b, b, points, tape[rigid + NARROW_WORK], margin)
+
+
+@inner
+def _put_contact(tape, s, n, rigid, k, pair, source, place, one, other):
+    """Write a point of a pair as a contact."""
+    record = tape[rigid + PAIR_RECORDS] + PAIR * pair
+    c = tape[rigid + CONTACT_WORK] + CONTACT_ENTRIES * place
+    for i in range(C_ID):
+        s[c + i] = s[source + i]
+    s[c + C_ID] = IDS * pair + s[source + C_ID]
+    s[c + C_RESTITUTION] = s[LANES * tape[record + 2] + k]
+    s[c + C_FRICTION] = s[LANES * tape[record + 3] + k]
+    n[tape[rigid + END_A] + place] = one
+    n[tape[rigid + END_B] + place] = other
+
+
+@inner
 def find_contacts(tape, s, n, rigid, k, kept):
     """Write the contacts of lane k, of what is free to move, to the work area; how many.
 
@@ -155,47 +221,80 @@ def find_contacts(tape, s, n, rigid, k, kept):
         kept: places of the buffer that are taken by what sleeps.
     """
     capacity = tape[rigid + CAPACITY] - kept
-    points = tape[rigid + POINTS_WORK]
-    work = tape[rigid + NARROW_WORK]
-    placed = tape[rigid + PLACED_WORK]
-    colliders = tape[rigid + COLLIDER_RECORDS]
     count = 0
     lost = False
-    record = tape[rigid + PAIR_RECORDS]
     for pair in range(tape[rigid + PAIRS]):
-        first = tape[record]
-        second = tape[record + 1]
-        a = placed + PLACED_ENTRIES * first
-        b = placed + PLACED_ENTRIES * second
-        kind_a = tape[colliders + COLLIDER * first]
-        kind_b = tape[colliders + COLLIDER * second]
-        one = tape[colliders + COLLIDER * first + 1]
-        other = _movable(tape, s, rigid, tape[colliders + COLLIDER * second + 1])
-        margin = _SLACK + s[a + _MOVE] + s[b + _MOVE]
-        free = other >= 0 or _movable(tape, s, rigid, one) >= 0
-        if free and not _apart(s, kind_b, a, b, margin):
-            found = collide(s, kind_a, a, kind_b, b, points, work, margin)
-            for point in range(found):
-                source = points + POINT * point
+        one, other, free = _pair_solids(tape, s, rigid, pair)
+        if free:
+            for point in range(_collide_pair(tape, s, rigid, pair, _SLACK, 1.0)):
+                source = tape[rigid + POINTS_WORK] + POINT * point
                 place = count
                 if count == capacity:
                     lost = True
                     place = _shallowest(tape, s, rigid, count, s[source + C_GAP])
                 if place >= 0:
-                    c = tape[rigid + CONTACT_WORK] + CONTACT_ENTRIES * place
-                    for i in range(C_ID):
-                        s[c + i] = s[source + i]
-                    s[c + C_ID] = IDS * pair + s[source + C_ID]
-                    s[c + C_RESTITUTION] = s[LANES * tape[record + 2] + k]
-                    s[c + C_FRICTION] = s[LANES * tape[record + 3] + k]
-                    n[tape[rigid + END_A] + place] = one
-                    n[tape[rigid + END_B] + place] = other
+                    _put_contact(tape, s, n, rigid, k, pair, source, place, one, other)
                     if count < capacity:
                         count += 1
-        record += PAIR
     if lost:
         s[LANES * tape[rigid + OVERFLOW_ROW] + k] = 1.0
     return count
+
+
+@inner
+def find_late_contacts(tape, s, n, rigid, k, kept, count, dt, slop):
+    """Add the contacts of lane k that overlap where the step ends, with velocities that would not let them.
+
+    One that is known already is taken as it is there. What overlapped from the start may stay as deep.
+
+    Returns:
+        How many contacts there are then, and whether there is a new one.
+    """
+    capacity = tape[rigid + CAPACITY] - kept
+    known = count
+    found = False
+    for pair in range(tape[rigid + PAIRS]):
+        one, other, free = _pair_solids(tape, s, rigid, pair)
+        points = _collide_pair(tape, s, rigid, pair, -slop, 0.0) if free else 0
+        if points > 0:
+            deepest = 0.0
+            for i in range(known):
+                c = tape[rigid + CONTACT_WORK] + CONTACT_ENTRIES * i
+                if s[c + C_ID] // IDS == pair:
+                    late = s[c + C_LATE]
+                    deepest = min(deepest, s[c + C_GAP] if late == 0.0 else 1.0 - late)
+            for point in range(points):
+                source = tape[rigid + POINTS_WORK] + POINT * point
+                place = count
+                for i in range(known):
+                    c = tape[rigid + CONTACT_WORK] + CONTACT_ENTRIES * i
+                    if s[c + C_ID] == IDS * pair + s[source + C_ID]:
+                        place = i
+                if s[source + C_GAP] < deepest - slop and place < capacity:
+                    found = True
+                    c = tape[rigid + CONTACT_WORK] + CONTACT_ENTRIES * place
+                    before = s[c + C_IMPULSE] if place < count else 0.0
+                    _put_contact(tape, s, n, rigid, k, pair, source, place, one, other)
+                    a = solid_at(tape, rigid, one)
+                    b = solid_at(tape, rigid, other) if other >= 0 else -1
+                    prepare_rows(s, c, a, b, S_END)
+                    u, _, _ = relative_velocity(s, c, a, b, S_STEP)
+                    # Never to part: that would take energy from nowhere.
+                    s[c + C_LEAST] = min(u + (deepest - s[c + C_GAP]) / dt, 0.0)
+                    s[c + C_LATE] = 1.0 - deepest
+                    s[c + C_EARLIER] = 0.0
+                    s[c + C_FRICTION] = 0.0
+                    s[c + C_HELD] = 0.0
+                    s[c + C_REBOUND] = 0.0
+                    s[c + C_COMPLIANCE] = 0.0
+                    s[c + C_IMPULSE] = before
+                    s[c + C_IMPULSE + 1] = 0.0
+                    s[c + C_IMPULSE + 2] = 0.0
+                    if place == count:
+                        count += 1
+                elif place >= capacity:
+                    s[LANES * tape[rigid + OVERFLOW_ROW] + k] = 1.0
+    return count, found
 
 
 @inner
@@ -223,7 +322,7 @@ def prepare_contacts(tape, s, n, rigid, count):
         c = tape[rigid + CONTACT_WORK] + CONTACT_ENTRIES * i
         a = solid_at(tape, rigid, n[tape[rigid + END_A] + i])
         b = n[tape[rigid + END_B] + i]
-        prepare_rows(s, c, a, solid_at(tape, rigid, b) if b >= 0 else -1)
+        prepare_rows(s, c, a, solid_at(tape, rigid, b) if b >= 0 else -1, S_PLACE)
 
 
 @inner

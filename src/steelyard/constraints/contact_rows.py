@@ -20,7 +20,6 @@ from ..model.rigid_layout import (
     S_INVERSE,
     S_INVERSE_INERTIA,
     S_MOVES,
-    S_PLACE,
     S_TURNS,
 )
 from .solids import solid_at, symmetric_times
@@ -61,10 +60,10 @@ def frame(s, c):
 
 
 @inner
-def _arm(s, c, solid, out):
+def _arm(s, c, solid, place, out):
     """From a solid's place to the contact; 0 where it does not turn."""
     for k in range(3):
-        s[c + out + k] = s[solid + S_TURNS] * (s[c + C_PLACE + k] - s[solid + S_PLACE + k])
+        s[c + out + k] = s[solid + S_TURNS] * (s[c + C_PLACE + k] - s[solid + place + k])
 
 
 @inner
@@ -90,13 +89,13 @@ def _mobility(s, c, solid, arm):
 
 
 @inner
-def prepare_rows(s, c, a, b):
-    """Frame, arms and mean mobility of a contact between solids at ``a`` and ``b`` (-1: scenery)."""
+def prepare_rows(s, c, a, b, place):
+    """Frame, arms and mean mobility of a contact of solids at ``a`` and ``b`` (-1: scenery), in a field of places."""
     frame(s, c)
-    _arm(s, c, a, C_ARM_A)
+    _arm(s, c, a, place, C_ARM_A)
     weight = _mobility(s, c, a, C_ARM_A)
     if b >= 0:
-        _arm(s, c, b, C_ARM_B)
+        _arm(s, c, b, place, C_ARM_B)
         weight += _mobility(s, c, b, C_ARM_B)
     s[c + C_WEIGHT] = weight / 3.0
 

@@ -245,6 +245,16 @@ def drift_solids(tape, s, rigid, k, dt):
 
 
 @inner
+def drift_by_impulses(tape, s, rigid, k, dt):
+    """The same by the impulses of a solve."""
+    for i in range(tape[rigid + SOLIDS]):
+        at = solid_at(tape, rigid, i)
+        for c in range(6):
+            s[at + S_BASE + c] = s[at + S_VELOCITY + c]
+    drift_solids(tape, s, rigid, k, dt)
+
+
+@inner
 def end_drift(tape, s, rigid, k):
     """Put all solids of lane k where ``drift_solids`` moved them."""
     for i in range(tape[rigid + SOLIDS]):

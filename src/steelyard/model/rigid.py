@@ -270,7 +270,7 @@ class Rigid:
         words[at.BOUND_ROW] = c.model.places[RIGID, "bound"][0]
         words[at.ROW_WORK] = entries(at.ROW_ENTRIES * sum(map(_rows, self.joints)))
         words[at.FRAME_WORK] = entries(at.FRAME_ENTRIES)
-        words[at.PACK_ROW] = c.take(13 + ROTOR_ROWS) if self.joints else -1
+        words[at.PACK_ROW] = c.take(13 + ROTOR_ROWS)
         words[at.SOLID_WORK] = entries(at.SOLID_ENTRIES * (solids + 1))
         words[at.PLACED_WORK] = entries(PLACED_ENTRIES * len(self.colliders))
         words[at.CONTACT_WORK] = entries(at.CONTACT_ENTRIES * capacity)

@@ -72,11 +72,12 @@ SOLID_ENTRIES = 136
 # Work of a contact: what the narrow phase writes (normal from b to a, gap, place, id), two tangents, arms, friction,
 # restitution, compliance, least normal velocity, impulses of the last pass and of this one along normal and tangents,
 # velocity and its change, shift of the normal velocity by friction, rebound, the derivative of the impulse, mobility,
-# normal impulse that is there already, and whether it was known before.
+# normal impulse that is there already, whether it was known before,
+# and if it was only found where the step ends, one more than its pair was deep at the start.
 C_NORMAL, C_GAP, C_PLACE, C_ID, C_TANGENT, C_BINORMAL, C_ARM_A, C_ARM_B = 0, 3, 4, 7, 8, 11, 14, 17
 C_FRICTION, C_RESTITUTION, C_COMPLIANCE, C_LEAST, C_BEFORE, C_IMPULSE = 20, 21, 22, 23, 24, 27
 C_SPEED, C_CHANGE = 30, 33
-C_SHIFT, C_REBOUND, C_DERIVATIVE, C_WEIGHT, C_HELD, C_EARLIER = 36, 37, 38, 44, 45, 46
+C_SHIFT, C_REBOUND, C_DERIVATIVE, C_WEIGHT, C_HELD, C_EARLIER, C_LATE = 36, 37, 38, 44, 45, 46, 47
 CONTACT_ENTRIES = 48
 
 # Numbers of a joint's end: place and axes in its solid. Entries of a row of a joint: direction of its force, of its

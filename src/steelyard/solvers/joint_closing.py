@@ -12,6 +12,7 @@ from ..constraints.joints import (
     tautness,
 )
 from ..constraints.solids import (
+    drift_by_impulses,
     drift_solids,
     end_drift,
     gather_solids,
@@ -76,11 +77,7 @@ def close_over_step(tape, s, n, rigid, k, dt, taut):
 @inner
 def drift_as_solved(tape, s, rigid, k, dt):
     """Drift with the impulses at hand, whatever joints do by that."""
-    for i in range(tape[rigid + SOLIDS]):
-        at = solid_at(tape, rigid, i)
-        for c in range(SIX):
-            s[at + S_BASE + c] = s[at + S_VELOCITY + c]
-    drift_solids(tape, s, rigid, k, dt)
+    drift_by_impulses(tape, s, rigid, k, dt)
     end_drift(tape, s, rigid, k)
 
 

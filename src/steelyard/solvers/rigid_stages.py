@@ -13,6 +13,7 @@ from typing import ClassVar
 
 from ..collision.contact_list import (
     find_contacts,
+    is_fast,
     match_contacts,
     place_colliders,
     prepare_contacts,
@@ -61,6 +62,8 @@ from ..model.rigid_layout import (
     NUMBERS,
     S_FREE,
     S_GRADIENT,
+    S_PLACE,
+    S_ROTATION,
     SETTINGS,
     SOLID,
     SOLID_RECORDS,
@@ -80,6 +83,7 @@ from ..stage import Stage, stage
 from .base import Solver
 from .blows import pass_blows, start_velocities
 from .joint_closing import close_over_step, drift_as_solved, join_again
+from .late_contacts import meet_late
 from .rigid_islands import ALL, PUSH, solve_islands
 from .sleep import (
     all_asleep,
@@ -223,7 +227,7 @@ def _contacts_at_hand(tape, s, n, rigid, k, dt):
     while True:
         gather_solids(tape, s, rigid, k)
         kept = keep_sleeping_contacts(tape, s, rigid, k)
-        place_colliders(tape, s, rigid, k, dt)
+        place_colliders(tape, s, rigid, k, dt, S_PLACE, S_ROTATION)
         count = find_contacts(tape, s, n, rigid, k, kept)
         if not wake_touched(tape, s, rigid, k, count):
             break
@@ -277,7 +281,11 @@ def _position_stage(tape, s, n, rigid, k, dt):
         rate, share = _softness(_STIFFER * numbers[N_HERTZ], _JOINT_RATIO, dt)
         soften_joints(tape, s, rigid, rate, share)
     taut = 0.0 if swept else tautness(tape, s, rigid, k, dt)
+    fast = is_fast(tape, s, rigid)
     solve_islands(tape, s, n, rigid, count, k, ALL)
+    # Where contacts are soft steps are short.
+    if fast and not soft:
+        count = meet_late(tape, s, n, rigid, k, kept, count, dt)
     closed = True
     if tape[rigid + JOINTS] > 0:
         if swept:
