@@ -8,7 +8,14 @@ one, since a point that serves two lets stacks fall.
 
 from __future__ import annotations
 
-from ..constraints.contact_rows import contact_vector, length, prepare_rows, relative_velocity
+from ..constraints.contact_rows import (
+    contact_at,
+    contact_ends,
+    contact_vector,
+    length,
+    prepare_rows,
+    relative_velocity,
+)
 from ..constraints.solids import is_free, solid_at
 from ..kernel import inner
 from ..math.pointers import LANES, doubles_at
@@ -242,10 +249,23 @@ def find_contacts(tape, s, n, rigid, k, kept):
 
 
 @inner
+def _foreseen(tape, s, n, rigid, i, dt):
+    """Depth that a contact may have where the step ends: that of the start, or what the solve has left it."""
+    c = contact_at(tape, rigid, i)
+    late = abs(s[c + C_LATE])
+    if late > 0.0:
+        return 1.0 - late
+    a, b = contact_ends(tape, n, rigid, i)
+    u, _, _ = relative_velocity(s, c, a, b, S_STEP)
+    return s[c + C_GAP] + dt * min(u, 0.0)
+
+
+@inner
 def find_late_contacts(tape, s, n, rigid, k, kept, count, dt, slop):
     """Add the contacts of lane k that overlap where the step ends, with velocities that would not let them.
 
-    One that is known already is taken as it is there. What overlapped from the start may stay as deep.
+    One that is known already is taken as it is there. What overlapped from the start may stay as deep, and what the
+    solve left to overlap too.
 
     Returns:
         How many contacts there are then, and whether there is a new one.
@@ -261,8 +281,7 @@ def find_late_contacts(tape, s, n, rigid, k, kept, count, dt, slop):
             for i in range(known):
                 c = tape[rigid + CONTACT_WORK] + CONTACT_ENTRIES * i
                 if s[c + C_ID] // IDS == pair:
-                    late = s[c + C_LATE]
-                    deepest = min(deepest, s[c + C_GAP] if late == 0.0 else 1.0 - late)
+                    deepest = min(deepest, _foreseen(tape, s, n, rigid, i, dt))
             for point in range(points):
                 source = tape[rigid + POINTS_WORK] + POINT * point
                 place = count
@@ -281,7 +300,7 @@ def find_late_contacts(tape, s, n, rigid, k, kept, count, dt, slop):
                     u, _, _ = relative_velocity(s, c, a, b, S_STEP)
                     # Never to part: that would take energy from nowhere.
                     s[c + C_LEAST] = min(u + (deepest - s[c + C_GAP]) / dt, 0.0)
-                    s[c + C_LATE] = 1.0 - deepest
+                    s[c + C_LATE] = deepest - 1.0
                     s[c + C_EARLIER] = 0.0
                     s[c + C_FRICTION] = 0.0
                     s[c + C_HELD] = 0.0

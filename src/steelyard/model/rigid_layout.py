@@ -73,7 +73,7 @@ SOLID_ENTRIES = 136
 # restitution, compliance, least normal velocity, impulses of the last pass and of this one along normal and tangents,
 # velocity and its change, shift of the normal velocity by friction, rebound, the derivative of the impulse, mobility,
 # normal impulse that is there already, whether it was known before,
-# and if it was only found where the step ends, one more than its pair was deep at the start.
+# and if it was only found where the step ends, one more than its pair may be deep there, below 0 before it is solved.
 C_NORMAL, C_GAP, C_PLACE, C_ID, C_TANGENT, C_BINORMAL, C_ARM_A, C_ARM_B = 0, 3, 4, 7, 8, 11, 14, 17
 C_FRICTION, C_RESTITUTION, C_COMPLIANCE, C_LEAST, C_BEFORE, C_IMPULSE = 20, 21, 22, 23, 24, 27
 C_SPEED, C_CHANGE = 30, 33

@@ -25,7 +25,7 @@ from ..model.rigid_layout import (
     S_GRADIENT,
 )
 from .blows import start_velocities
-from .rigid_islands import ALL, solve_islands
+from .rigid_islands import LATE, solve_islands
 
 _TURNS = 4
 
@@ -46,7 +46,10 @@ def meet_late(tape, s, n, rigid, k, kept, count, dt):
             c = contact_at(tape, rigid, i)
             for axis in range(3):
                 s[c + C_BEFORE + axis] = s[c + C_IMPULSE + axis]
-        solve_islands(tape, s, n, rigid, count, k, ALL)
+        solve_islands(tape, s, n, rigid, count, k, LATE)
+        for i in range(count):
+            c = contact_at(tape, rigid, i)
+            s[c + C_LATE] = abs(s[c + C_LATE])
     start_velocities(tape, s, rigid, k)
     for i in range(count):
         c = contact_at(tape, rigid, i)

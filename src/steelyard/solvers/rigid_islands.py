@@ -16,6 +16,7 @@ from ..model.rigid_layout import (
     C_BEFORE,
     C_COMPLIANCE,
     C_IMPULSE,
+    C_LATE,
     C_SHIFT,
     C_WEIGHT,
     HELD,
@@ -29,6 +30,7 @@ from ..model.rigid_layout import (
     OFF,
     ORDER,
     ROW_ENTRIES,
+    S_BASE,
     S_FREE,
     S_GEOMETRIC,
     S_PUSH,
@@ -42,8 +44,9 @@ from ..stage import call_stage
 from .block_cholesky import SIX
 from .islands import UNSEEN, gather_island, join_all
 
-# What is solved for: ALL impulses; CHANGES of those of joints, one pass of which more follow; or a PUSH from rest.
-ALL, CHANGES, PUSH = range(3)
+# What is solved for: ALL impulses; CHANGES of those of joints, one pass of which more follow; a PUSH from rest; or,
+# where contacts came LATE, all again of their islands, of which others keep the base.
+ALL, CHANGES, PUSH, LATE = range(4)
 
 
 @inner
@@ -139,12 +142,21 @@ def _keep_joint_impulses(tape, s, n, rigid, joints):
 
 
 @inner
+def _is_late(tape, s, n, rigid, contacts):
+    """Whether an island has a contact that is not solved yet."""
+    late = False
+    for j in range(contacts):
+        late = late or s[contact_at(tape, rigid, n[tape[rigid + LIST] + j]) + C_LATE] < 0.0
+    return late
+
+
+@inner
 def solve_islands(tape, s, n, rigid, count, k, what):
     """Solve all islands of lane k; solids end with the impulses on them in S_VELOCITY, after a push with velocities.
 
     Args:
         count: number of contacts that count.
-        what: ALL, CHANGES or PUSH.
+        what: ALL, CHANGES, PUSH or LATE.
     """
     join_all(tape, s, n, rigid, count)
     for seed in range(tape[rigid + SOLIDS]):
@@ -155,8 +167,14 @@ def solve_islands(tape, s, n, rigid, count, k, what):
         elif n[tape[rigid + LOCAL] + seed] == UNSEEN:
             gather_island(tape, n, rigid, seed, count)
             size, contacts, joints, _ = island_at_hand(tape, n, rigid)
+            if what == LATE and not _is_late(tape, s, n, rigid, contacts):
+                for i in range(size):
+                    solid = solid_at(tape, rigid, n[tape[rigid + ORDER] + i])
+                    for c in range(SIX):
+                        s[solid + S_VELOCITY + c] = s[solid + S_BASE + c]
+                continue
             if contacts + joints > 0 or what == PUSH:
-                call_stage(tape[rigid + SOLVE], tape, s, n, what)
+                call_stage(tape[rigid + SOLVE], tape, s, n, ALL if what == LATE else what)
                 if n[tape[rigid + ISLAND] + SETTLED] == 0:
                     s[LANES * tape[H_UNSETTLED] + k] = 1.0
             if what != PUSH:
