@@ -292,7 +292,6 @@ def find_late_contacts(tape, s, n, rigid, k, kept, count, dt, slop):
                 if s[source + C_GAP] < deepest - slop and place < capacity:
                     found = True
                     c = tape[rigid + CONTACT_WORK] + CONTACT_ENTRIES * place
-                    before = s[c + C_IMPULSE] if place < count else 0.0
                     _put_contact(tape, s, n, rigid, k, pair, source, place, one, other)
                     a = solid_at(tape, rigid, one)
                     b = solid_at(tape, rigid, other) if other >= 0 else -1
@@ -306,9 +305,9 @@ def find_late_contacts(tape, s, n, rigid, k, kept, count, dt, slop):
                     s[c + C_HELD] = 0.0
                     s[c + C_REBOUND] = 0.0
                     s[c + C_COMPLIANCE] = 0.0
-                    s[c + C_IMPULSE] = before
-                    s[c + C_IMPULSE + 1] = 0.0
-                    s[c + C_IMPULSE + 2] = 0.0
+                    # An impulse along another normal would be none of a start.
+                    for axis in range(3):
+                        s[c + C_IMPULSE + axis] = 0.0
                     if place == count:
                         count += 1
                 elif place >= capacity:
