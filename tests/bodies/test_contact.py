@@ -301,6 +301,24 @@ def test_a_tumbling_heap_settles_without_a_failed_solve(seed):
     assert world.bodies.position[0, :, 1].min() > 0.19
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_what_turns_fast_meets_what_faced_away_when_the_step_began(seed):
+    rng = np.random.default_rng(seed)
+    scene = sy.Scene()
+    for i in range(10):
+        box(
+            scene, rng.uniform(-0.5, 0.5), 1.0 + 1.6 * i, rng.uniform(-0.5, 0.5), half=tuple(rng.uniform(0.2, 0.45, 3)),
+            orientation=tuple(rng.normal(size=4)), angular_velocity=tuple(4 * rng.normal(size=3)),
+        )  # fmt: skip
+    world = sy.World(on_ground(scene, friction=0.5))
+    energy = first = world.energy[0]
+    for _ in range(180):
+        world.step()
+        assert world.penetration[0] < 1e-2
+        assert world.energy[0] <= energy + 1e-5 * first
+        energy = world.energy[0]
+
+
 def test_a_thin_plate_that_falls_flat_lands_flat():
     """All eight of its corners are near the ground within a step: the lower ones must be those that count."""
     scene = sy.Scene()

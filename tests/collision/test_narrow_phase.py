@@ -172,6 +172,22 @@ def test_a_box_on_a_box_has_the_corners_of_what_overlaps():
     assert corners == {(x, 0.5, z) for x in (-0.2, 0.6) for z in (-0.3, 0.6)}
 
 
+@pytest.mark.parametrize("angle", [1e-12, 1e-10, 1e-8, 1e-6])
+@pytest.mark.parametrize("seed", range(5))
+def test_faces_on_each_other_touch_at_their_corners_whatever_rounding_does(angle, seed):
+    # Sides that lie on each other cross somewhere along their way: no place for a point.
+    rng = np.random.default_rng(seed)
+    common = Rotation.random(random_state=rng).as_matrix()
+    half = np.array((0.5, 0.2, 0.3))
+    tilt = Rotation.from_rotvec(angle * rng.normal(size=3)).as_matrix()
+    up = common @ (0.0, 0.4, 0.0)
+    points = collide(BOX, placed(up, common @ tilt, half), BOX, placed(np.zeros(3), common, half))
+    corners = [common @ (x * 0.5, 0.2, z * 0.3) for x in (-1, 1) for z in (-1, 1)]
+    assert len(points) == 4
+    for corner in corners:
+        assert np.linalg.norm(points[:, 4:7] - corner, axis=1).min() < 10 * angle + 1e-9
+
+
 def test_crossed_edges_touch_at_one_point():
     turn = Rotation.from_euler("x", 45, degrees=True).as_matrix()
     other = Rotation.from_euler("z", 45, degrees=True).as_matrix()
