@@ -74,8 +74,8 @@ def test_an_oblique_blow_gives_the_spin_that_friction_can(e, friction, dt):
     world.step(round(0.3 / dt))
     lost = min(friction * (1 + e) * 20.0, 2.0 / 7.0 * 4.0)
     velocity, spin = world.bodies.velocity[0, 0], world.bodies.angular_velocity[0, 0]
-    np.testing.assert_allclose(velocity, (4 - lost, 20 * e, 0), atol=1e-6)
-    np.testing.assert_allclose(spin, (0, 0, -2.5 * lost / 0.25), atol=1e-5)
+    np.testing.assert_allclose(velocity, (4 - lost, 20 * e, 0), atol=1e-12)
+    np.testing.assert_allclose(spin, (0, 0, -2.5 * lost / 0.25), atol=1e-11)
 
 
 @pytest.mark.parametrize("e", [0.0, 0.4, 1.0])

@@ -8,7 +8,13 @@ from __future__ import annotations
 
 from math import sqrt
 
-from ..constraints.contact_rows import contact_at, contact_ends, relative_velocity, world_vector
+from ..constraints.contact_rows import (
+    contact_at,
+    contact_ends,
+    length,
+    relative_velocity,
+    world_vector,
+)
 from ..constraints.joint_rows import joint_at, joint_solids, row_at, row_velocity
 from ..constraints.solids import symmetric_times
 from ..kernel import inner
@@ -54,18 +60,38 @@ from ..model.tape import H_RIGID
 from ..stage import stage
 from .rigid_islands import PUSH, begin_velocity, forget_impulses, island_at_hand
 
+# Sweeps of a single contact, and the change, over its impulse, at which it stands still.
+_SETTLING, _SETTLED = 40, 4e-16
+
+
+@inner
+def _moment(s, c, arm, direction):
+    """Moment of a unit impulse at a contact along one of its directions."""
+    nx = s[c + direction]
+    ny = s[c + direction + 1]
+    nz = s[c + direction + 2]
+    return (
+        s[c + arm + 1] * nz - s[c + arm + 2] * ny,
+        s[c + arm + 2] * nx - s[c + arm] * nz,
+        s[c + arm] * ny - s[c + arm + 1] * nx,
+    )
+
 
 @inner
 def mobility_along(s, c, solid, arm, direction):
     """What a unit impulse at a contact does to the velocity along its direction there, on one solid."""
-    nx = s[c + direction]
-    ny = s[c + direction + 1]
-    nz = s[c + direction + 2]
-    x = s[c + arm + 1] * nz - s[c + arm + 2] * ny
-    y = s[c + arm + 2] * nx - s[c + arm] * nz
-    z = s[c + arm] * ny - s[c + arm + 1] * nx
+    x, y, z = _moment(s, c, arm, direction)
     a, b, d = symmetric_times(s, solid + S_INVERSE_INERTIA, x, y, z)
     return s[solid + S_INVERSE] + a * x + b * y + d * z
+
+
+@inner
+def _mobility_across(s, c, solid, arm):
+    """What a unit impulse along one tangent does to the velocity along the other."""
+    x, y, z = _moment(s, c, arm, C_TANGENT)
+    a, b, d = symmetric_times(s, solid + S_INVERSE_INERTIA, x, y, z)
+    x, y, z = _moment(s, c, arm, C_BINORMAL)
+    return a * x + b * y + d * z
 
 
 @inner
@@ -111,6 +137,13 @@ def _begin(tape, s, n, rigid, contacts, joints):
             if b >= 0:
                 mobility += mobility_along(s, c, b, C_ARM_B, direction)
             s[c + C_DERIVATIVE + k] = mobility
+        across = _mobility_across(s, c, a, C_ARM_A)
+        if b >= 0:
+            across += _mobility_across(s, c, b, C_ARM_B)
+        # One for both tangents, the largest in their plane: with one each, friction would not be along the slip.
+        mean = 0.5 * (s[c + C_DERIVATIVE + 1] + s[c + C_DERIVATIVE + 2])
+        half = 0.5 * (s[c + C_DERIVATIVE + 1] - s[c + C_DERIVATIVE + 2])
+        s[c + C_DERIVATIVE + 1] = mean + sqrt(half * half + across * across)
         # So far over the mobility.
         s[c + C_COMPLIANCE] *= s[c + C_DERIVATIVE]
     for j in range(joints):
@@ -144,7 +177,7 @@ def _sweep_contact(s, c, a, b):
     if most > 0.0 or l1 != 0.0 or l2 != 0.0:
         _, u1, u2 = relative_velocity(s, c, a, b, S_VELOCITY)
         t1 = l1 - u1 / s[c + C_DERIVATIVE + 1]
-        t2 = l2 - u2 / s[c + C_DERIVATIVE + 2]
+        t2 = l2 - u2 / s[c + C_DERIVATIVE + 1]
         size = sqrt(t1 * t1 + t2 * t2)
         if size > most:
             share = most / size
@@ -231,6 +264,24 @@ def _mend_worst(tape, s, n, rigid, contacts, joints):
         a, b = joint_solids(tape, rigid, joint_at(tape, rigid, found))
         _sweep_row(s, found_row, a, b)
     return contact >= 0 or found >= 0
+
+
+@inner
+def settle_contact(tape, s, n, rigid):
+    """Sweep an island's only contact until its impulse stands still: Coulomb's law to rounding; whether it did."""
+    i = n[tape[rigid + LIST]]
+    c = contact_at(tape, rigid, i)
+    a, b = contact_ends(tape, n, rigid, i)
+    s[c + C_COMPLIANCE] = 0.0
+    _begin(tape, s, n, rigid, 1, 0)
+    for _ in range(_SETTLING):
+        l0, l1, l2 = s[c + C_IMPULSE], s[c + C_IMPULSE + 1], s[c + C_IMPULSE + 2]
+        _sweep_contact(s, c, a, b)
+        change = length(s[c + C_IMPULSE] - l0, s[c + C_IMPULSE + 1] - l1, s[c + C_IMPULSE + 2] - l2)
+        size = length(s[c + C_IMPULSE], s[c + C_IMPULSE + 1], s[c + C_IMPULSE + 2])
+        if change <= _SETTLED * size:
+            return True
+    return False
 
 
 @stage
