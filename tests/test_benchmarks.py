@@ -237,7 +237,14 @@ def test_environment_benchmark_on_an_environment_that_is_always_there() -> None:
     assert environments.heavy_imports("gymnasium") == []
 
 
-@pytest.mark.parametrize("name", run.BENCHMARKS)
+# They compile what nothing else here does, for a minute in all.
+DEAR = ("against_mujoco", "environments", "planar", "undeclared")
+
+
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=[pytest.mark.slow] * (name in DEAR)) for name in run.BENCHMARKS],
+)
 def test_quick_run(name: str, tmp_path: Path) -> None:
     done = subprocess.run(
         [sys.executable, "-m", "benchmarks.run", name, "--quick", "--output", str(tmp_path)],

@@ -82,14 +82,18 @@ def drift_as_solved(tape, s, rigid, k, dt):
 
 
 @inner
-def join_again(tape, s, n, rigid, k, dt):
-    """Move solids the least that closes their joints, in the metric of their masses; velocities stay as they are."""
+def join_again(tape, s, n, rigid, k, dt, allowed):
+    """Move solids the least that closes their joints, in the metric of their masses; velocities stay as they are.
+
+    Args:
+        allowed: error [m or rad] that is left as it is.
+    """
     worst = 0.0
-    for _ in range(_PROJECTIONS):
+    for turn in range(_PROJECTIONS):
         gather_solids(tape, s, rigid, k)
         worst = begin_joints(tape, s, rigid, k, dt, PUSHES)
-        if worst <= _CLOSE:
-            break
+        if worst <= _CLOSE or (turn == 0 and worst <= allowed):
+            return
         rest_solids(tape, s, rigid)
         solve_islands(tape, s, n, rigid, 0, k, PUSH)
         move_solids(tape, s, rigid, k, dt)

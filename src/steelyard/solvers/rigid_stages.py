@@ -98,6 +98,8 @@ from .sleep import (
 _STIFFER, _JOINT_RATIO = 2.0, 2.0
 # Share of a penetration that one step takes away, and the fastest push [m/s].
 _SHARE, _FASTEST = 1.0, 3.0
+# Error of joints [m or rad] that a push may leave to the next step.
+_OPENED = 1e-3
 # A gap [m] at which a contact that carried nothing is closed all the same.
 _CLOSED = 1e-10
 # A gap [m] that nothing closes; and in place of what is held, that the gap was no larger when the step began.
@@ -302,7 +304,7 @@ def _position_stage(tape, s, n, rigid, k, dt):
     _store_contacts(tape, s, n, rigid, k, count, kept)
     store_joints(tape, s, rigid, k, dt, False)
     if not closed:
-        join_again(tape, s, n, rigid, k, dt)
+        join_again(tape, s, n, rigid, k, dt, 0.0)
 
 
 @inner
@@ -353,6 +355,9 @@ def _push_apart(tape, s, n, rigid, k, count, dt, slop):
     solve_islands(tape, s, n, rigid, count, k, PUSH)
     move_solids(tape, s, rigid, k, dt)
     pay_for_lifts(tape, s, rigid, k, dt)
+    # Sweeps leave joints open by more.
+    if tape[rigid + JOINTS] > 0 and doubles_at(tape[rigid + NUMBERS])[N_SWEEPS] == 0.0:
+        join_again(tape, s, n, rigid, k, dt, _OPENED)
 
 
 @stage
