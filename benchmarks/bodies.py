@@ -263,7 +263,7 @@ def draw_heap(found: Measured, path: Path) -> None:
         panel.grid(visible=True, which="major", alpha=0.3)
         for axis in (panel.xaxis, panel.yaxis):
             axis.set_minor_formatter(NullFormatter())
-    panels[0].set_xticks([0.02, 0.05, 0.1, 0.2], ["2 cm", "5 cm", "10 cm", "20 cm"])
+    panels[0].set_xticks([1e-4, 1e-3, 1e-2, 0.1], [".1 mm", "1 mm", "1 cm", "10 cm"])
     for panel in panels:
         panel.set_yticks([2, 5, 10, 20], ["2", "5", "10", "20"])
     panels[1].legend(loc="center left", bbox_to_anchor=(1.02, 0.5), frameon=False)
