@@ -289,7 +289,10 @@ def find_late_contacts(tape, s, n, rigid, k, kept, count, dt, slop):
                     c = tape[rigid + CONTACT_WORK] + CONTACT_ENTRIES * i
                     if s[c + C_ID] == IDS * pair + s[source + C_ID]:
                         place = i
-                if s[source + C_GAP] < deepest - slop and place < capacity:
+                late = s[source + C_GAP] < deepest - slop
+                if late and place >= capacity:
+                    s[LANES * tape[rigid + OVERFLOW_ROW] + k] = 1.0
+                elif late:
                     found = True
                     c = tape[rigid + CONTACT_WORK] + CONTACT_ENTRIES * place
                     _put_contact(tape, s, n, rigid, k, pair, source, place, one, other)
@@ -310,8 +313,6 @@ def find_late_contacts(tape, s, n, rigid, k, kept, count, dt, slop):
                         s[c + C_IMPULSE + axis] = 0.0
                     if place == count:
                         count += 1
-                elif place >= capacity:
-                    s[LANES * tape[rigid + OVERFLOW_ROW] + k] = 1.0
     return count, found
 
 
