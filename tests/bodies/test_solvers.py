@@ -136,7 +136,9 @@ def test_tumbling_heaps_come_down_without_a_burst(name):
         assert np.abs(world.bodies.velocity).max() < 1.0
     assert np.median(gains) < 2e-3
     if name == "worst first" and max(gains) >= 1e-2:
-        pytest.xfail("mending the worst first gains some hundredths of a heap's energy now and then")
+        pytest.xfail(
+            "mending the worst first gains some hundredths of a heap's energy now and then"
+        )
     assert max(gains) < 1e-2
 
 
