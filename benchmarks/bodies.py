@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from benchmarks import record
 from benchmarks.figures import Announce, Figure
 from benchmarks.peers.mujoco_bodies import BodyFlight, BodySettings
 
-STAGES = ("stack", "heap", "ragdoll", "growth", "rays")
+STAGES = ("stack", "heap", "ragdoll", "growth", "broad phase", "rays")
 DT = 0.01
 Measured = dict[str, dict[str, float]]
 Readings = dict[str, Callable[[], float]]
@@ -160,6 +160,7 @@ def _fly(step: Callable[[], None], read: Readings, looks: int) -> dict[str, floa
 #: Ways to hold a heap, by name.
 SOLVERS: dict[str, Any] = {
     "proximal Newton": sy.ProximalNewton(),
+    "Gauss-Seidel x 3": sy.GaussSeidel(3),
     "Gauss-Seidel x 5": sy.GaussSeidel(5),
     "Gauss-Seidel x 10": sy.GaussSeidel(10),
     "Gauss-Seidel x 30": sy.GaussSeidel(30),
@@ -347,6 +348,52 @@ def _growth(quick: bool) -> tuple[Any, list[Figure]]:
     ]
 
 
+def strewn(count: int) -> sy.Scene:
+    """Boxes and balls in turn that fall on a ground whose size grows with their number."""
+    rng = np.random.default_rng(4)
+    scene = sy.Scene()
+    wide = 0.9 * np.sqrt(count)
+    for i in range(count):
+        half = rng.uniform(0.2, 0.5, 3)
+        shape = sy.Sphere(float(half[0])) if i % 2 else sy.Box(tuple(half))
+        x, z = rng.uniform(-0.5 * wide, 0.5 * wide, 2)
+        place = (x, rng.uniform(1.0, 8.0), z)
+        scene.add(sy.Body(position=place, orientation=tuple(rng.normal(size=4)), parts=shape))
+    return _grounded(scene)
+
+
+#: Ways to find what is near.
+PHASES: tuple[Literal["pairs", "tree"], ...] = ("pairs", "tree")
+
+
+def _broad_phase(quick: bool) -> tuple[Any, list[Figure]]:
+    """Many bodies in one world by ten sweeps, for 2 s, with all pairs tried and with a tree."""
+    counts: Sequence[int] = (10, 20) if quick else (10, 20, 40, 80, 160, 320, 640, 1280)
+    steps = 10 if quick else 200
+    calls = {}
+    for count in counts:
+        for phase in PHASES:
+            solver = sy.GaussSeidel(10, rest_time=None, broad_phase=phase)
+            method = sy.Method(sy.Rattle(), solver, dt=DT)
+            calls[f"{count} by {phase}"] = (
+                lambda count=count, method=method: sy.World(strewn(count), method=method).step(
+                    steps
+                ),
+                float(steps),
+            )
+    cost = _timed(calls, 1 if quick else 3)
+    found = {
+        phase: {str(count): cost[f"{count} by {phase}"] for count in counts} for phase in PHASES
+    }
+    most = str(counts[-1])
+    return {"per_step": found}, [
+        Figure(
+            name=f"{most} bodies: all pairs over a tree",
+            measured=found["pairs"][most] / found["tree"][most],
+        )
+    ]
+
+
 def _rays(quick: bool) -> tuple[Any, list[Figure]]:
     """A thousand rays against a hundred bodies: with a tree, and trying all."""
 
@@ -372,4 +419,11 @@ def _rays(quick: bool) -> tuple[Any, list[Figure]]:
     ]
 
 
-_MEASURES = {"stack": _stack, "heap": _heap, "ragdoll": _ragdoll, "growth": _growth, "rays": _rays}
+_MEASURES = {
+    "stack": _stack,
+    "heap": _heap,
+    "ragdoll": _ragdoll,
+    "growth": _growth,
+    "broad phase": _broad_phase,
+    "rays": _rays,
+}

@@ -182,7 +182,7 @@ def contacts_at_a_time(scene: Scene, horizon: float) -> float:
     if not joined_or_touching(scene):
         return 0.0
     world = World(scene, method=method)
-    if not len(world.model.pairs):
+    if not world.model.touching:
         return 0.0
     steps = max(round(horizon / method.dt), 1)
     looks = min(steps, _LOOKS)

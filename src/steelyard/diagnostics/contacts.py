@@ -10,6 +10,7 @@ import numpy as np
 from ..collision.manifold import IDS
 from ..model.parameters import RIGID
 from ..model.rigid_layout import STORED, T_ID, T_IMPULSE, T_PLACE
+from ..queries.placed import owners_in
 
 if TYPE_CHECKING:
     from ..world import World
@@ -20,15 +21,18 @@ class Contacts:
     """Contacts of all worlds in a buffer of ``capacity`` places each, of which the first ``count`` are taken.
 
     Attributes:
-        pairs: (thing, other thing) of every pair of colliders that can meet.
-        pair: index of each contact's pair, -1 in places that are free, (worlds, capacity) int64.
+        things: bodies, particles and grounds that something can touch.
+        first: index of each contact's first thing among them, which can move; -1 in places that are free,
+            (worlds, capacity) int64.
+        second: index of its other thing.
         place: [m], (worlds, capacity, 3).
-        impulse: on the pair's first thing [N s], in the second half of the last step, (worlds, capacity, 3).
+        impulse: on the first thing [N s], in the second half of the last step, (worlds, capacity, 3).
         force: the same over the time in which it acted [N].
     """
 
-    pairs: tuple[tuple[Any, Any], ...]
-    pair: np.ndarray
+    things: tuple[Any, ...]
+    first: np.ndarray
+    second: np.ndarray
     place: np.ndarray
     impulse: np.ndarray
     force: np.ndarray
@@ -36,15 +40,13 @@ class Contacts:
     @property
     def count(self) -> np.ndarray:
         """Number of contacts, (worlds,)."""
-        return (self.pair >= 0).sum(axis=1)
+        return (self.first >= 0).sum(axis=1)
 
     def force_on(self, thing: Any) -> np.ndarray:
         """Sum of the contact forces on a thing [N], (worlds, 3)."""
-        sign = np.array(
-            [(a is thing) - (b is thing) for a, b in self.pairs] + [0], dtype=np.float64
-        )
-        total = np.einsum("wc,wck->wk", sign[self.pair], self.force)
-        return np.asarray(total)
+        index = next((k for k, known in enumerate(self.things) if known is thing), None)
+        sign = (self.first == index).astype(np.float64) - (self.second == index)
+        return np.asarray(np.einsum("wc,wck->wk", sign, self.force))
 
 
 def contacts_of(world: World) -> Contacts:
@@ -57,11 +59,14 @@ def contacts_of(world: World) -> Contacts:
     stored = world._view(RIGID, "contacts").reshape(world.worlds, -1, STORED)
     # What lies behind the last is of no meaning.
     taken = np.logical_and.accumulate(stored[..., T_ID] > 0.0, axis=1)
-    pair = np.where(taken, (stored[..., T_ID].astype(np.int64) - 1) // IDS, -1)
+    pair = np.where(taken, (stored[..., T_ID].astype(np.int64) - 1) // IDS, 0)
+    things, index = owners_in(world)
+    first, second = (np.where(taken, index[ends], -1) for ends in divmod(pair, len(index)))
     impulse = stored[..., T_IMPULSE : T_IMPULSE + 3].copy()
     return Contacts(
-        pairs=world.model.met,
-        pair=pair,
+        things=things,
+        first=first,
+        second=second,
         place=stored[..., T_PLACE : T_PLACE + 3].copy(),
         impulse=impulse,
         force=impulse / (0.5 * world.method.substep),

@@ -28,7 +28,7 @@ from .network import Network
 from .parameters import PARTICLES, Key, Parameters, Slot
 from .propagators import add_propagators
 from .rigid import Rigid
-from .rigid_layout import COLLIDER, JOINT, PAIR, SOLID
+from .rigid_layout import COLLIDER, JOINT, MEETING, PAIR, SOLID
 from .saddle import Saddle
 from .stiffness import Stiffness
 from .tape import (
@@ -62,8 +62,7 @@ class Model:
         parameters: assignable values and the rows that follow from them.
         places: first state row and size of what varies, by (thing, name).
         recipe: stages of a step in order, each with its part.
-        met: things of every pair of colliders that can meet.
-        pairs: the numbers of these colliders, (pairs, 2) int64.
+        touching: whether two colliders can meet, of which one can move.
         numbers: settings and local geometry of rigid contacts.
         blocks: number of matrix blocks.
         skip: entries of the flags of blocks and what stands behind them.
@@ -78,8 +77,7 @@ class Model:
     parameters: Parameters = field(default_factory=Parameters)
     places: dict[Key, tuple[int, int]] = field(default_factory=dict)
     recipe: Recipe = ()
-    met: tuple[tuple[Any, Any], ...] = ()
-    pairs: np.ndarray = field(default_factory=lambda: np.zeros((0, 2), dtype=np.int64))
+    touching: bool = False
     numbers: np.ndarray = field(default_factory=lambda: np.zeros(0))
     skip: int = 0
     blocks: int = 0
@@ -118,7 +116,8 @@ class Compiler:
             "winches": 3, "movers": 5, "links": LINK, "contacts": CONTACT, "generators": 2,
             "recipe": 2, "unknowns": 4, "spring_blocks": 4, "drag_blocks": 1, "float_blocks": 1,
             "bodies": BODY, "points": BODY_POINT, "wrenched": WRENCHED, "applied": 3, "thrusts": 5, "surfaces": 8,
-            "explosions": 4, "solids": SOLID, "colliders": COLLIDER, "pairs": PAIR, "joints": JOINT,
+            "explosions": 4, "solids": SOLID, "colliders": COLLIDER, "pairs": PAIR,
+            "meetings": MEETING, "joints": JOINT,
             "propagators": 2, "parts": 2, "compliances": COMPLIANCE, "kinks": KINK,
         }  # fmt: skip
         self.next_row = 0

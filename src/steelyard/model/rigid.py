@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from itertools import combinations
+from itertools import combinations, combinations_with_replacement
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..collision.contact_list import PLACED_ENTRIES
+from ..collision.broad_phase import MANY
+from ..collision.hierarchy import BOX_NUMBERS, STACK, tree_numbers, tree_words
 from ..collision.narrow_phase import ALL_POINTS, MOST_POINTS, POINT, WORK
+from ..collision.placement import PLACED_ENTRIES
 from ..integrators.rotor import ROTOR_ROWS
 from ..math.pointers import LANES
 from ..scene.body import Body
@@ -29,7 +31,7 @@ _POINTS = {SPHERE: 1, CAPSULE: 2}
 _USUAL = 16
 
 
-_SECTIONS = ("solids", "colliders", "pairs", "joints", "wakers")
+_SECTIONS = ("solids", "colliders", "pairs", "meetings", "partings", "joints", "wakers")
 
 
 def _rows(joint: Any) -> int:
@@ -44,7 +46,15 @@ class Rigid:
         self._c = c
         self.colliders: Colliders = colliders_of(c.scene, points=True)
         self.joints: list[Any] = c.scene.of(*JOINTS)
-        self.pairs = self._pairs()
+        self.group, self.meetings = self._groups()
+        self.partings = self._partings()
+        #: Colliders with an end; half-spaces stand behind them.
+        self.planes = int((self.colliders.kind != HALF_SPACE).sum())
+        broad_phase = getattr(c.method.solver, "broad_phase", None)
+        #: Whether near pairs are found by a tree, and not all are listed.
+        self.tree = broad_phase == "tree" or (broad_phase is None and self.planes >= MANY)
+        self.pairs = [] if self.tree else self._pairs()
+        self.touching = self._any_meets()
         self.capacity = self._capacity()
 
     @property
@@ -52,25 +62,76 @@ class Rigid:
         """What solids are of, in order."""
         return [*self._c.scene.bodies, *self._c.particles]
 
-    def _pairs(self) -> list[tuple[int, int, Any]]:
-        """(collider that can move, other collider, generator) in order."""
+    def _groups(self) -> tuple[list[int], list[list[Any]]]:
+        """The group of each collider, and what two groups meet by: the last generator that names both, or None."""
+        scene, colliders = self._c.scene, self.colliders
+        generators = scene.of(Ground, Collisions)
+        everything = {id(thing) for thing in self._things}
+        named = [
+            everything if g.particles is None else {id(thing) for thing in g.particles}
+            for g in generators
+        ]
+        keys: dict[tuple[bool, tuple[int, ...]], int] = {}
+        group: list[int] = []
+        for owner in colliders.owner:
+            plane = isinstance(owner, Ground)
+            names = (
+                g is owner if plane else id(owner) in some
+                for g, some in zip(generators, named, strict=True)
+            )
+            key = plane, tuple(k for k, name in enumerate(names) if name)
+            group.append(keys.setdefault(key, len(keys)))
+
+        def meets(one: tuple[bool, tuple[int, ...]], other: tuple[bool, tuple[int, ...]]) -> Any:
+            wanted = Collisions if one[0] == other[0] else Ground
+            both = [generators[k] for k in one[1] if k in other[1]]
+            return next((g for g in reversed(both) if isinstance(g, wanted)), None)
+
+        return group, [[meets(one, other) for other in keys] for one in keys]
+
+    def _pairs(self) -> list[tuple[int, int]]:
+        """(collider that can move, other collider) of every two that can meet, in order."""
         scene, colliders = self._c.scene, self.colliders
         everything = self._things
-        pairs: list[tuple[int, int, Any]] = []
-        joined = {frozenset(map(id, joint.members())) for joint in self.joints if not joint.collide}
+        pairs: list[tuple[int, int]] = []
+        parted = set(self.partings)
+        index = {id(thing): i for i, thing in enumerate(everything)}
         for generator in scene.of(Ground, Collisions):
             chosen = everything if generator.particles is None else list(generator.particles)
             own = colliders.of(*chosen)
             if isinstance(generator, Ground):
                 (plane,) = colliders.of(generator)
-                pairs += [(k, plane, generator) for k in own if colliders.owner[k].movable]
+                pairs += [(k, plane) for k in own if colliders.owner[k].movable]
                 continue
             for a, b in combinations(own, 2):
                 first, second = colliders.owner[a], colliders.owner[b]
-                apart = first is not second and frozenset((id(first), id(second))) not in joined
-                if apart and (first.movable or second.movable):
-                    pairs.append((a, b, generator) if first.movable else (b, a, generator))
-        return pairs
+                apart = first is not second and self._key(index, first, second) not in parted
+                latest = self.meetings[self.group[a]][self.group[b]] is generator
+                if apart and latest and (first.movable or second.movable):
+                    pairs.append((a, b) if first.movable else (b, a))
+        # As a tree finds them.
+        return sorted(pairs, key=lambda pair: (pair[1] < self.planes, pair))
+
+    def _key(self, index: dict[int, int], one: Any, other: Any) -> int:
+        """Number of two solids, whatever their order."""
+        a, b = sorted((index[id(one)], index[id(other)]))
+        return a * len(index) + b
+
+    def _partings(self) -> list[int]:
+        """Keys of joined solids that may lie in each other, ascending."""
+        index = {id(thing): i for i, thing in enumerate(self._things)}
+        ends = [tuple(joint.members()) for joint in self.joints if not joint.collide]
+        return sorted({self._key(index, *pair) for pair in ends if len(pair) == 2})
+
+    def _any_meets(self) -> bool:
+        """Whether two colliders can meet, of which one can move."""
+        if not self.tree:
+            return bool(self.pairs)
+        counts = [self.group.count(g) for g in range(len(self.meetings))]
+        return any(
+            self.meetings[g][h] is not None and (g != h or counts[g] > 1)
+            for g, h in combinations_with_replacement(range(len(counts)), 2)
+        )
 
     def _capacity(self) -> int:
         """Contacts that the buffer of a world holds."""
@@ -80,15 +141,15 @@ class Rigid:
         kind = self.colliders.kind
         each = (
             min(_POINTS.get(kind[a], MOST_POINTS), _POINTS.get(kind[b], MOST_POINTS))
-            for a, b, _ in self.pairs
+            for a, b in self.pairs
         )
-        movable = sum(thing.movable for thing in self._things)
-        return min(sum(each), _USUAL * movable)
+        usual = _USUAL * sum(thing.movable for thing in self._things)
+        return usual if self.tree else min(sum(each), usual)
 
     @property
     def active(self) -> bool:
         """Whether there is anything to hold."""
-        return bool(self.pairs or self.joints)
+        return self.touching or bool(self.joints)
 
     def state(self) -> None:
         """Stored contacts, and whether some did not fit; impulses of joints, what drives them, and what is broken."""
@@ -113,37 +174,35 @@ class Rigid:
         c.header["rigid"] = -1
         if not self.active:
             return
-        owner = self.colliders.owner
-        c.model.met = tuple((owner[a], owner[b]) for a, b, _ in self.pairs)
-        c.model.pairs = np.array([(a, b) for a, b, _ in self.pairs], dtype=np.int64).reshape(-1, 2)
+        c.model.touching = self.touching
         things = self._things
         index = {id(thing): i for i, thing in enumerate(things)}
         solids = [word for thing in things for word in self._solid(thing)]
         colliders = [word for k in range(len(self.colliders)) for word in self._collider(k, index)]
-        surfaces: dict[int, tuple[int, int]] = {}
-        pairs: list[int] = []
-        for a, b, generator in self.pairs:
-            if id(generator) not in surfaces:
-                surfaces[id(generator)] = (
-                    c.parameter(generator, "restitution", generator.restitution),
-                    c.parameter(generator, "friction", generator.friction),
-                )
-            pairs += [a, b, *surfaces[id(generator)]]
+        meetings = [
+            row
+            for generators in self.meetings
+            for generator in generators
+            for row in self._surface(generator)
+        ]
+        pairs = [collider for pair in self.pairs for collider in pair]
         self._numbers()
         joints: list[int] = []
         first = 0
         for joint in self.joints:
             joints += self._joint(joint, first, index)
             first += _rows(joint)
-        wakers = self._wakers(solids, pairs, colliders, joints)
+        wakers = self._wakers(solids, meetings, colliders, joints)
         for name, records in zip(
-            _SECTIONS, (solids, colliders, pairs, joints, wakers), strict=True
+            _SECTIONS,
+            (solids, colliders, pairs, meetings, self.partings, joints, wakers),
+            strict=True,
         ):
             c.sections[name] = records
         self._record(len(things), len(wakers))
 
     def _wakers(
-        self, solids: list[int], pairs: list[int], colliders: list[int], joints: list[int]
+        self, solids: list[int], meetings: list[int], colliders: list[int], joints: list[int]
     ) -> list[int]:
         """Rows of what all solids share, and of masses: what sleeps wakes if one of them changes."""
         rows: list[int] = []
@@ -153,8 +212,7 @@ class Rigid:
                 rows.append(mass)
             else:
                 rows += [*range(place, place + 3), *(range(turn, turn + 4) if turn >= 0 else ())]
-        for k in range(0, len(pairs), at.PAIR):
-            rows += pairs[k + 2 : k + 4]
+        rows += meetings
         for k in range(0, len(colliders), at.COLLIDER):
             kind, row = colliders[k], colliders[k + 3]
             rows += range(row, row + (4 if kind == HALF_SPACE else row >= 0))
@@ -166,6 +224,15 @@ class Rigid:
                 first = at.DRIVES_AT + at.DRIVE * drive
                 rows += joint[first + 1 : first + at.DRIVE]
         return sorted({row for row in rows if row >= 0})
+
+    def _surface(self, generator: Any) -> tuple[int, int]:
+        """Rows of a generator's restitution and friction, -1 without one."""
+        if generator is None:
+            return -1, -1
+        return (
+            self._c.parameter(generator, "restitution", generator.restitution),
+            self._c.parameter(generator, "friction", generator.friction),
+        )
 
     def _solid(self, thing: Body | Particle) -> list[int]:
         """Record of what contacts push."""
@@ -197,12 +264,12 @@ class Rigid:
             normal = c.parameter(owner, "normal", owner.normal)
             height = c.parameter(owner, "height", owner.height)
             assert height == normal + 3
-            return [kind, -1, k, normal]
+            return [kind, -1, k, normal, self.group[k]]
         row = -1
         if isinstance(owner, Particle):
             p = c.of(owner)
             row = c.slot(1, ((PARTICLES, "radius"),), lambda value: value[p : p + 1])
-        return [kind, index[id(owner)], k, row]
+        return [kind, index[id(owner)], k, row, self.group[k]]
 
     def _numbers(self) -> None:
         """Settings and local geometry."""
@@ -258,6 +325,12 @@ class Rigid:
         words[at.SOLIDS] = solids
         words[at.COLLIDERS] = len(self.colliders)
         words[at.PAIRS] = len(self.pairs)
+        words[at.PLANES] = self.planes
+        words[at.GROUPS] = len(self.meetings)
+        words[at.PARTINGS] = len(self.partings)
+        words[at.BOXES] = -1
+        if self.tree:
+            words[at.BOXES] = entries(LANES * (tree_numbers(self.planes) + BOX_NUMBERS))
         words[at.NUMBERS] = c.model.numbers.ctypes.data
         words[at.STORED_ROW] = c.model.places[RIGID, "contacts"][0]
         words[at.OVERFLOW_ROW] = c.model.places[RIGID, "overflow"][0]
@@ -284,7 +357,8 @@ class Rigid:
             (at.DEGREES, solids + 1), (at.ADJACENT, 2 * bonds), (at.ORDER, solids), (at.LOCAL, solids),
             (at.FIRST, solids), (at.STARTS, solids), (at.END_A, bonds), (at.END_B, bonds),
             (at.LIST, capacity), (at.MATCHED, capacity), (at.HELD, len(self.joints)),
-            (at.ISLAND, at.ISLAND_ENTRIES),
+            (at.ISLAND, at.ISLAND_ENTRIES), (at.TREES, LANES * tree_words(self.planes) if self.tree else 0),
+            (at.NEAR, STACK + 3 * self.planes + 2 * len(self.colliders) if self.tree else 2),
         ):  # fmt: skip
             words[word] = place
             place += size

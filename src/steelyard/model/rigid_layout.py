@@ -12,8 +12,9 @@ from __future__ import annotations
     SOLIDS, SOLID_RECORDS, COLLIDERS, COLLIDER_RECORDS, PAIRS, PAIR_RECORDS, NUMBERS, STORED_ROW, CAPACITY,
     OVERFLOW_ROW, START_ROW, SOLID_WORK, PLACED_WORK, CONTACT_WORK, POINTS_WORK, NARROW_WORK, MATRIX_ROW, VECTOR_ROW,
     JOINTS, JOINT_RECORDS, ROW_WORK, FRAME_WORK, BOUND_ROW, PACK_ROW, REST_ROW, WAKERS, WAKER_RECORDS, SOLVE,
-    DEGREES, ADJACENT, ORDER, LOCAL, FIRST, STARTS, END_A, END_B, LIST, MATCHED, HELD, ISLAND, RIGID_WORDS,
-) = range(41)  # fmt: skip
+    PLANES, GROUPS, MEETING_RECORDS, PARTING_RECORDS, PARTINGS, BOXES,
+    DEGREES, ADJACENT, ORDER, LOCAL, FIRST, STARTS, END_A, END_B, LIST, MATCHED, HELD, ISLAND, TREES, NEAR, RIGID_WORDS,
+) = range(49)  # fmt: skip
 
 # The island at hand: numbers of solids, contacts, joints and the factor's rows, and whether the solve settled.
 SETTLED, ISLAND_ENTRIES = 4, 5
@@ -21,10 +22,12 @@ SETTLED, ISLAND_ENTRIES = 4, 5
 # Record of a solid (body or particle): rows of position, orientation, velocity, angular momentum, inverse mass, inertia
 # and its inverse, -1 where it has none; whether it moves (1) and turns (2); rows of its constant acceleration.
 SOLID = 9
-# Record of a collider: kind, solid or -1, its number, and rows of a ground's plane or of a particle's radius.
-COLLIDER = 4
-# Record of a pair: colliders a and b, of which a can move; rows of restitution and friction.
-PAIR = 4
+# Record of a collider: kind, solid or -1, its number, rows of a ground's plane or of a particle's radius, its group.
+COLLIDER = 5
+# Record of a pair, where a scene lists them all: colliders a and b, of which a can move.
+PAIR = 2
+# Record of how a group meets another: rows of restitution and friction, or -1.
+MEETING = 2
 # Record of a joint: locked coordinates as bits, solids a and b (or -1: the world), its numbers, first of its rows and
 # how many, state rows of whether it is broken, of its force and of its torque, rows of the force and torque that break
 # it and of its length, number of drives; and of each drive: coordinate, rows of speed, strength, limits, stiffness,

@@ -119,11 +119,13 @@ from __future__ import annotations
     H_SOLIDS,
     H_COLLIDERS,
     H_PAIRS,
+    H_MEETINGS,
+    H_PARTINGS,
     H_JOINTS,
     H_WAKERS,
     H_RIGID,
-) = range(113)
-HEADER = 113
+) = range(115)
+HEADER = 115
 
 # Width of the records of links, contacts and springs that a solver holds; written field by field.
 LINK = 17

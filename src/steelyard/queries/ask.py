@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from ..collision.hierarchy import STACK, tree_numbers, tree_words
 from ..model.colliders import CENTRE, PLACED, SIZE, SPHERE, TURN, kind_and_size
 from ..scene import checks
 from ..scene.shapes import Box, Capsule, Hollow, Shape, Sphere, rotation_matrix
-from .casts import HEAD, HIT, MANY, MEMORY, STACK, cast_many, overlap_many
-from .placed import colliders_in, placed_colliders
+from .casts import HIT, MANY, MEMORY, cast_many, overlap_many
+from .placed import colliders_in, owners_in, placed_colliders
 
 if TYPE_CHECKING:
     from ..world import World
@@ -216,8 +217,8 @@ class Queries:
         found = np.full(shape, -1, dtype=np.int64)
         hits = np.zeros((*shape, HIT))
         work = (
-            np.zeros(MEMORY), np.zeros((max(2 * n, 1), 3), dtype=np.int64), np.zeros((max(2 * n, 1), 6)),
-            np.zeros(HEAD, dtype=np.int64), np.zeros(STACK, dtype=np.int64), np.zeros(9 + HIT),
+            np.zeros(MEMORY), np.zeros(tree_words(n), dtype=np.int64), np.zeros(tree_numbers(n) + 6),
+            np.zeros(STACK, dtype=np.int64),
         )  # fmt: skip
         placed = placed_colliders(self._world)
         if way is None:
@@ -238,6 +239,7 @@ class Queries:
                 found,
                 hits,
                 *work,
+                np.zeros(9 + HIT),
             )
         distance = np.where(found >= 0, hits[..., 0], np.inf)
         if every:
@@ -250,7 +252,7 @@ class Queries:
             hits = np.take_along_axis(hits, order[..., None], -2)
         else:
             found, distance, hits = found[..., 0], distance[..., 0], hits[..., 0, :]
-        things, index = _owners(colliders.owner)
+        things, index = owners_in(self._world)
         return Hits(
             things=things,
             thing=np.where(found >= 0, index[found], -1) if n else found,
@@ -273,14 +275,3 @@ class Queries:
         wanted = known if only is None else {id(thing) for thing in only}
         wanted -= {id(thing) for thing in ignore}
         return np.array([id(owner) in wanted for owner in colliders.owner], dtype=bool)
-
-
-def _owners(owners: tuple[Any, ...]) -> tuple[tuple[Any, ...], np.ndarray]:
-    """The things that have colliders, and which of them each collider is of."""
-    things: list[Any] = []
-    place: dict[int, int] = {}
-    for owner in owners:
-        if id(owner) not in place:
-            place[id(owner)] = len(things)
-            things.append(owner)
-    return tuple(things), np.array([place[id(owner)] for owner in owners], dtype=np.int64)

@@ -10,12 +10,20 @@ from __future__ import annotations
 
 from math import sqrt
 
-from ..collision.hierarchy import HEAD, ROOT, STACK, children, clear_tree, insert_leaf, meets
+from ..collision.broad_phase import half_extent
+from ..collision.hierarchy import (
+    box_of,
+    children,
+    clear_tree,
+    insert_leaf,
+    meets,
+    root_of,
+)
 from ..collision.manifold import axis
 from ..collision.narrow_phase import ALL_POINTS, POINT, WORK, collide
 from ..kernel import inner, kernel
 from ..math.pointers import doubles_at
-from ..model.colliders import BOX, CAPSULE, HALF_SPACE, PLACED, SIZE, SPHERE
+from ..model.colliders import BOX, HALF_SPACE, PLACED, SIZE
 
 # Newton's steps, and the gap [m] that is none, over the sizes at hand.
 _STEPS, _TOUCHING = 100, 1e-14
@@ -169,40 +177,29 @@ def _cast_one(m, kind_a, kind_b, x, y, z, dx, dy, dz, reach, hit):
 
 
 @inner
-def half_extent(kind, placed, k):
-    """Half the length of a placed collider along an axis of the world."""
-    if kind == SPHERE:
-        return placed[SIZE]
-    if kind == CAPSULE:
-        return placed[SIZE] + placed[SIZE + 1] * abs(placed[3 + 3 * k + 1])
-    total = 0.0
-    for j in range(3):
-        total += placed[SIZE + j] * abs(placed[3 + 3 * k + j])
-    return total
-
-
-@inner
-def plant(kinds, placed, allowed, nodes, bounds, head):
-    """A tree of the allowed colliders of one world that have an end."""
-    n = kinds.shape[0]
-    clear_tree(nodes, head, n)
-    for i in range(n):
+def plant(kinds, placed, allowed, n, s):
+    """A tree of the allowed colliders of one world that have an end, in all of two arrays."""
+    leaves = kinds.shape[0]
+    clear_tree(n, 0, leaves)
+    for i in range(leaves):
         if allowed[i] and kinds[i] != HALF_SPACE:
+            own = box_of(0, i)
             for k in range(3):
-                half = half_extent(kinds[i], placed[i], k)
-                bounds[i, k] = placed[i, k] - half
-                bounds[i, 3 + k] = placed[i, k] + half
-            insert_leaf(nodes, bounds, head, n, i)
+                half = half_extent(placed[i], kinds[i], 0, k)
+                s[own + k] = placed[i, k] - half
+                s[own + 3 + k] = placed[i, k] + half
+            insert_leaf(n, 0, s, 0, leaves, i)
 
 
 @inner
-def _enters(bounds, node, ray, half, limit):
-    """Way at which a box, enlarged by half extents, is entered; above the limit where it is not."""
+def _enters(s, node, ray, half, limit):
+    """Way at which a node's box, enlarged by half extents, is entered; above the limit where it is not."""
     first = 0.0
     last = limit
+    own = box_of(0, node)
     for k in range(3):
-        low = bounds[node, k] - half[k] - ray[k]
-        high = bounds[node, 3 + k] + half[k] - ray[k]
+        low = s[own + k] - half[k] - ray[k]
+        high = s[own + 3 + k] + half[k] - ray[k]
         speed = ray[3 + k]
         if speed == 0.0:
             if low > 0.0 or high < 0.0:
@@ -218,7 +215,7 @@ def _enters(bounds, node, ray, half, limit):
 @kernel
 def cast_many(
     kinds, placed, allowed, kind, query, direction, reach, every, tree, found, hits,
-    memory, nodes, bounds, head, stack, ray,
+    memory, words, boxes, stack, ray,
 ):  # fmt: skip
     """Casts of many shapes in many worlds.
 
@@ -234,7 +231,8 @@ def cast_many(
         tree: whether to plant one, or to try all colliders.
         found: collider that is hit, or -1, (worlds, casts, n or 1) int64, written; all hits in the colliders' order.
         hits: of these, (worlds, casts, n or 1, HIT), written.
-        memory: (MEMORY,) to work in; the other arrays are for the tree, the nodes before a walk and the ray.
+        memory: (MEMORY,) to work in; the other arrays are for the tree's words, its boxes and one more behind them,
+            the nodes before a walk and the ray.
     """
     m = doubles_at(memory.ctypes.data)
     n = kinds.shape[0]
@@ -242,18 +240,18 @@ def cast_many(
     hit = ray[9:]
     for w in range(placed.shape[0]):
         if tree:
-            plant(kinds, placed[w], allowed, nodes, bounds, head)
+            plant(kinds, placed[w], allowed, words, boxes)
         for c in range(query.shape[1]):
             for k in range(3):
                 ray[k] = query[w, c, k]
                 ray[3 + k] = direction[w, c, k]
-                half[k] = half_extent(kind, query[w, c], k)
+                half[k] = half_extent(query[w, c], kind, 0, k)
             for k in range(PLACED):
                 m[k] = query[w, c, k]
             best = reach[w, c]
             waiting = 0
-            if tree and head[ROOT] >= 0:
-                stack[0] = head[ROOT]
+            if tree and root_of(words, 0) >= 0:
+                stack[0] = root_of(words, 0)
                 waiting = 1
             # What no tree holds comes first: its hits shorten the walk.
             other = 0
@@ -266,13 +264,13 @@ def cast_many(
                 else:
                     waiting -= 1
                     node = stack[waiting]
-                    if _enters(bounds, node, ray, half, best) <= best:
+                    if _enters(boxes, node, ray, half, best) <= best:
                         if node < n:
                             item = node
                         else:
-                            left, right = children(nodes, node)
-                            near = _enters(bounds, left, ray, half, best)
-                            far = _enters(bounds, right, ray, half, best)
+                            left, right = children(words, 0, node)
+                            near = _enters(boxes, left, ray, half, best)
+                            far = _enters(boxes, right, ray, half, best)
                             if near > far:
                                 left, right = right, left
                                 near, far = far, near
@@ -312,24 +310,25 @@ def cast_many(
 
 @kernel
 def overlap_many(
-    kinds, placed, allowed, kind, query, tree, found, hits, memory, nodes, bounds, head, stack, box
+    kinds, placed, allowed, kind, query, tree, found, hits, memory, words, boxes, stack
 ):
     """Which colliders a shape overlaps, in many worlds; see ``cast_many``, whose hits these are with ways of 0."""
     m = doubles_at(memory.ctypes.data)
     n = kinds.shape[0]
+    box = boxes.shape[0] - 6
     for w in range(placed.shape[0]):
         if tree:
-            plant(kinds, placed[w], allowed, nodes, bounds, head)
+            plant(kinds, placed[w], allowed, words, boxes)
         for c in range(query.shape[1]):
             for k in range(PLACED):
                 m[k] = query[w, c, k]
             for k in range(3):
-                half = half_extent(kind, query[w, c], k)
-                box[k] = query[w, c, k] - half
-                box[3 + k] = query[w, c, k] + half
+                half = half_extent(query[w, c], kind, 0, k)
+                boxes[box + k] = query[w, c, k] - half
+                boxes[box + 3 + k] = query[w, c, k] + half
             waiting = 0
-            if tree and head[ROOT] >= 0:
-                stack[0] = head[ROOT]
+            if tree and root_of(words, 0) >= 0:
+                stack[0] = root_of(words, 0)
                 waiting = 1
             other = 0
             while other < n or waiting > 0:
@@ -341,11 +340,11 @@ def overlap_many(
                 else:
                     waiting -= 1
                     node = stack[waiting]
-                    if meets(bounds, node, box):
+                    if meets(boxes, box_of(0, node), box):
                         if node < n:
                             item = node
                         else:
-                            left, right = children(nodes, node)
+                            left, right = children(words, 0, node)
                             stack[waiting] = left
                             stack[waiting + 1] = right
                             waiting += 2
@@ -356,6 +355,3 @@ def overlap_many(
                     if index >= 0:
                         found[w, c, item] = item
                         _write(m, hits[w, c, item], 0.0, index)
-
-
-__all__ = ["HEAD", "HIT", "MANY", "MEMORY", "STACK", "cast_many", "overlap_many"]

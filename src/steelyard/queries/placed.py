@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -56,6 +56,18 @@ def _owned(world: World) -> Owned:
         grounds = tuple(k for k, owner in enumerate(colliders.owner) if isinstance(owner, Ground))
         _known[world.model] = Owned(colliders, of(Body), of(Particle), grounds)
     return _known[world.model]
+
+
+def owners_in(world: World) -> tuple[tuple[Any, ...], np.ndarray]:
+    """The things that have colliders, and which of them each collider is of."""
+    things: list[Any] = []
+    place: dict[int, int] = {}
+    owners = colliders_in(world).owner
+    for owner in owners:
+        if id(owner) not in place:
+            place[id(owner)] = len(things)
+            things.append(owner)
+    return tuple(things), np.array([place[id(owner)] for owner in owners], dtype=np.int64)
 
 
 def placed_colliders(world: World) -> np.ndarray:

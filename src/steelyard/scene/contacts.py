@@ -121,8 +121,8 @@ def check_thickness(radius: float, particles: Iterable[Particle]) -> None:
 class Collisions:
     """Particles, as balls of their radius, and bodies, none of which can enter another.
 
-    Every pair costs three rows in a solver: name only those that can meet. Two balls whose centres coincide push each
-    other up and down.
+    Every pair of particles costs three rows in their solvers: name only those that can meet. Two balls whose centres
+    coincide push each other up and down. Of bodies the last one that names both says how they meet.
 
     Args:
         restitution: rebound speed over approach speed, in [0, 1].
@@ -155,23 +155,22 @@ class Collisions:
         Raises:
             ValueError: no pair, two particles without a radius, or a body without a part.
         """
-        pairs = self.pairs_of(everything)
-        if not pairs:
-            count = len(everything if self.particles is None else self.particles)
+        chosen = list(everything if self.particles is None else self.particles)
+        movable = sum(thing.movable for thing in chosen)
+        if len(chosen) < 2 or movable == 0:
             raise ValueError(
-                f"Collisions: {count} particles make 0 pairs; it must be at least 1, of which one can move. "
+                f"Collisions: {len(chosen)} particles make 0 pairs; it must be at least 1, of which one can move. "
                 "Name two particles."
             )
-        for a, b in pairs:
-            for thing in (a, b):
-                check_parts("Collisions", thing)
-            if isinstance(a, Body) or isinstance(b, Body):
-                continue
-            if a.radius == 0.0 and b.radius == 0.0:
-                raise ValueError(
-                    f"Collisions: radius is 0.0 for the particles at {a.position} and {b.position}; one of "
-                    "them must be greater than 0, or they never touch. Give one a radius."
-                )
+        for thing in chosen:
+            check_parts("Collisions", thing)
+        points = [thing for thing in chosen if isinstance(thing, Particle) and thing.radius == 0.0]
+        points.sort(key=lambda point: not point.movable)
+        if len(points) > 1 and points[0].movable:
+            raise ValueError(
+                f"Collisions: radius is 0.0 for the particles at {points[0].position} and {points[1].position}; one of "
+                "them must be greater than 0, or they never touch. Give one a radius."
+            )
 
 
 def check_parts(owner: str, thing: Particle | Body) -> None:

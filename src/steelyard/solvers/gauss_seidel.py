@@ -30,18 +30,20 @@ from ..model.tape import (
 )
 from ..stage import Stage, stage
 from .base import Solver
+from .body_settings import BodySettings
 from .gather import clear_velocity_multipliers, gather
 from .stages import begin_stage, end_stage
 from .swept_bodies import SweptBodies
 
 
 @dataclass(frozen=True)
-class GaussSeidel(Solver):
+class GaussSeidel(BodySettings):
     """Projected Gauss-Seidel sweeps over all constraints (see the module).
 
     Args:
         passes: sweeps per stage and step, always all of them, so that cost is known and no world waits
             for another. What error they leave is measured, not flagged: see ``world.residual``.
+        slop, broad_phase, contacts, rest_speed, rest_time: of scenes of bodies, see ``BodySettings``.
     """
 
     passes: int = 20
@@ -49,7 +51,7 @@ class GaussSeidel(Solver):
     @property
     def for_bodies(self) -> Solver:
         """Sweeps over contacts and joints of bodies."""
-        return SweptBodies(passes=self.passes)
+        return SweptBodies(passes=self.passes, **self.body_settings)
 
     @property
     def stage(self) -> Stage:

@@ -7,7 +7,8 @@ done again, a few times over, since the new impulses turn solids in their turn.
 
 from __future__ import annotations
 
-from ..collision.contact_list import find_late_contacts, place_colliders
+from ..collision.contact_list import any_turns_far, find_late_contacts
+from ..collision.placement import place_colliders
 from ..constraints.contact_rows import contact_at, contact_ends, relative_velocity
 from ..constraints.solids import drift_by_impulses
 from ..kernel import inner
@@ -33,6 +34,8 @@ _TURNS = 4
 @inner
 def meet_late(tape, s, n, rigid, k, kept, count, dt):
     """Solve again for what overlaps where the step ends; how many contacts there are then."""
+    if not any_turns_far(tape, s, rigid, dt):
+        return count
     slop = doubles_at(tape[rigid + NUMBERS])[N_SLOP]
     for i in range(count):
         s[contact_at(tape, rigid, i) + C_LATE] = 0.0

@@ -45,12 +45,7 @@ class ProximalNewton(RigidSolver):
         tolerance: largest residual of a pass over the momentum at hand, both by kinetic energy.
         passes: most proximal passes.
         iterations: most Newton iterations of a pass; a world that needs more falls back to softer contacts.
-        slop: penetration [m] that is left alone.
-        contacts: most contacts of a world; by the number of its pairs by default. What is beyond sets a flag in
-            ``world.health``, and the deepest are kept.
-        rest_speed: what is slower [m/s and rad/s] is at rest.
-        rest_time: for how long [s] all of an island must be at rest before it sleeps; None where nothing shall. What
-            sleeps is where it would be awake within ``rest_speed`` times the time asleep, and wakes by itself.
+        slop, broad_phase, contacts, rest_speed, rest_time: see ``BodySettings``.
     """
 
     tolerance: float = 1e-9

@@ -13,11 +13,10 @@ from typing import ClassVar
 
 from ..collision.contact_list import (
     find_contacts,
-    is_fast,
     match_contacts,
-    place_colliders,
     prepare_contacts,
 )
+from ..collision.placement import place_colliders
 from ..constraints.contact_rows import contact_at, contact_ends, relative_velocity, world_vector
 from ..constraints.joints import (
     POSITIONS,
@@ -78,10 +77,9 @@ from ..model.rigid_layout import (
     T_REBOUND,
 )
 from ..model.tape import COUNT, H_BLOCKS, H_DT, H_RIGID
-from ..scene import checks
 from ..stage import Stage, stage
-from .base import Solver
 from .blows import pass_blows, start_velocities
+from .body_settings import BodySettings
 from .joint_closing import close_over_step, drift_as_solved, join_again
 from .late_contacts import meet_late
 from .rigid_islands import ALL, PUSH, solve_islands
@@ -108,36 +106,11 @@ _TOUCHED = -1.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class RigidSolver(Solver):
-    """Base of what holds contacts and joints of bodies; not to be used by itself.
+class RigidSolver(BodySettings):
+    """Base of what holds contacts and joints of bodies, and of particles as solids; not to be used by itself."""
 
-    Args:
-        slop: penetration [m] that is left alone.
-        contacts: most contacts of a world; by the number of its pairs by default. What is beyond sets a flag in
-            ``world.health``, and the deepest are kept.
-        rest_speed: what is slower [m/s and rad/s] is at rest.
-        rest_time: for how long [s] all of an island must be at rest before it sleeps; None where nothing shall. What
-            sleeps is where it would be awake within ``rest_speed`` times the time asleep, and wakes by itself.
-    """
-
-    slop: float = 1e-4
-    contacts: int | None = None
-    rest_speed: float = 1e-6
-    rest_time: float | None = 0.5
     staged: ClassVar[bool] = True
     rigid: ClassVar[bool] = True
-
-    def __post_init__(self) -> None:
-        owner = type(self).__name__
-        above = checks.Limit(above=0.0, remedy="Use 1e-4 for a tenth of a millimetre.")
-        checks.number(owner, "slop", self.slop, above)
-        if self.contacts is not None:
-            checks.whole(owner, "contacts", self.contacts, least=1, remedy="Leave it out.")
-        above = checks.Limit(above=0.0, remedy="Use 1e-6 for a micrometre per second.")
-        checks.number(owner, "rest_speed", self.rest_speed, above)
-        if self.rest_time is not None:
-            limit = checks.Limit(least=0.0, remedy="Use 0.5, or None where nothing shall sleep.")
-            checks.number(owner, "rest_time", self.rest_time, limit)
 
     @property
     def own_settings(self) -> dict[int, float]:
@@ -283,10 +256,9 @@ def _position_stage(tape, s, n, rigid, k, dt):
         rate, share = _softness(_STIFFER * numbers[N_HERTZ], _JOINT_RATIO, dt)
         soften_joints(tape, s, rigid, rate, share)
     taut = 0.0 if swept else tautness(tape, s, rigid, k, dt)
-    fast = is_fast(tape, s, rigid)
     solve_islands(tape, s, n, rigid, count, k, ALL)
     # Where contacts are soft steps are short.
-    if fast and not soft:
+    if not soft:
         count = meet_late(tape, s, n, rigid, k, kept, count, dt)
     closed = True
     if tape[rigid + JOINTS] > 0:

@@ -16,6 +16,7 @@ So nobody has to tell that something was changed, and a world sleeps alike in an
 
 from __future__ import annotations
 
+from ..collision.broad_phase import colliders_of_pair, solid_of
 from ..collision.manifold import IDS
 from ..constraints.contact_rows import contact_at, length
 from ..constraints.solids import is_free, rest_at, solid_at, symmetric_times
@@ -26,8 +27,6 @@ from ..model.rigid_layout import (
     C_GAP,
     C_ID,
     CAPACITY,
-    COLLIDER,
-    COLLIDER_RECORDS,
     END_A,
     END_B,
     LOCAL,
@@ -37,8 +36,6 @@ from ..model.rigid_layout import (
     N_SLOP,
     NUMBERS,
     ORDER,
-    PAIR,
-    PAIR_RECORDS,
     REST,
     REST_KICK,
     REST_POSE,
@@ -162,21 +159,14 @@ def hold_sleepers(tape, s, rigid, k):
 
 
 @inner
-def _solid_of(tape, rigid, pair, end):
-    """Solid of a pair's first or second collider, -1 for scenery."""
-    collider = tape[tape[rigid + PAIR_RECORDS] + PAIR * pair + end]
-    return tape[tape[rigid + COLLIDER_RECORDS] + COLLIDER * collider + 1]
-
-
-@inner
 def wake_touched(tape, s, rigid, k, count):
     """Wake islands that contacts found between what is awake and what sleeps join; whether there were any."""
     found = False
     if tape[rigid + REST_ROW] >= 0:
         for i in range(count):
             pair = int(s[contact_at(tape, rigid, i) + C_ID]) // IDS
-            for end in range(2):
-                solid = _solid_of(tape, rigid, pair, end)
+            for collider in colliders_of_pair(tape, rigid, pair):
+                solid = solid_of(tape, rigid, collider)
                 if solid >= 0:
                     island = s[rest_at(tape, rigid, solid, k)]
                     if island < 0.0:
@@ -200,11 +190,9 @@ def keep_sleeping_contacts(tape, s, rigid, k):
             at = LANES * (tape[rigid + STORED_ROW] + STORED * j) + k
             if s[at] == 0.0:
                 break
-            pair = int(s[at] - 1.0) // IDS
-            one = _solid_of(tape, rigid, pair, 0)
-            if _sleeps(tape, s, rigid, one) and _sleeps(
-                tape, s, rigid, _solid_of(tape, rigid, pair, 1)
-            ):
+            a, b = colliders_of_pair(tape, rigid, int(s[at] - 1.0) // IDS)
+            one = solid_of(tape, rigid, a)
+            if _sleeps(tape, s, rigid, one) and _sleeps(tape, s, rigid, solid_of(tape, rigid, b)):
                 if kept < j:
                     to = LANES * (tape[rigid + STORED_ROW] + STORED * kept) + k
                     for field in range(STORED):

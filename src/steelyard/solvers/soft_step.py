@@ -26,6 +26,7 @@ class SoftStep(RigidSolver):
         substeps: parts of a step, at least 1.
         hertz: frequency of the contacts' springs [1/s]; a quarter of the substeps' rate at most is sensible.
         ratio: damping over the critical one.
+        slop, broad_phase, contacts, rest_speed, rest_time: see ``BodySettings``.
     """
 
     substeps: int = 4

@@ -38,6 +38,7 @@ from ..model.tape import (
 )
 from ..stage import Stage, stage
 from .base import Solver
+from .body_settings import BodySettings
 from .swept_bodies import SweptBodies
 
 # Columns of the local contact list.
@@ -45,11 +46,12 @@ _NX, _NY, _NZ, _DEPTH, _RESTITUTION, _FRICTION, _MOVE_A, _MOVE_B = 0, 1, 2, 3, 4
 
 
 @dataclass(frozen=True)
-class WorstFirst(Solver):
+class WorstFirst(BodySettings):
     """The source's contact resolver (see the module).
 
     Args:
         iterations: resolutions per step; 0 means twice the number of contacts found, as the source does.
+        slop, broad_phase, contacts, rest_speed, rest_time: of scenes of bodies, see ``BodySettings``.
     """
 
     iterations: int = 0
@@ -58,7 +60,10 @@ class WorstFirst(Solver):
     @property
     def for_bodies(self) -> Solver:
         """The worst contact or joint of bodies first."""
-        return SweptBodies(passes=self.iterations or 2, worst=True, per_row=self.iterations == 0)
+        per_row = self.iterations == 0
+        return SweptBodies(
+            passes=self.iterations or 2, worst=True, per_row=per_row, **self.body_settings
+        )
 
     @property
     def stage(self) -> Stage:
