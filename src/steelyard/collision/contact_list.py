@@ -50,6 +50,8 @@ from ..model.rigid_layout import (
     S_PLACE,
     S_STEP,
     S_VELOCITY,
+    SOLID,
+    SOLID_RECORDS,
     SOLIDS,
     STORED,
     STORED_ROW,
@@ -74,25 +76,27 @@ from .placement import MOVE, PLACED_ENTRIES, REACH
 # Gap [m] beyond what both may move at which points are still kept: what just touches at the end must be known before.
 _SLACK = 1e-9
 # Solids that turn less against each other [rad] within a step turn no feature towards one that was not known: what
-# they do besides, a plane between them that was held from the start still parts.
+# they do besides, a plane between them that was held from the start still parts. Balls have no features.
 _FAR = 0.05
 # How far a point may be from a stored one of its pair to take its impulse, over the reach of its colliders.
 _NEAR = 0.25
 
 
 @inner
-def _angle(tape, s, rigid, one, other, dt):
-    """By how much [rad] a pair of solids, of which the second may be -1, turns against each other within a step."""
-    a = solid_at(tape, rigid, one) + S_STEP + 3
-    x = s[a]
-    y = s[a + 1]
-    z = s[a + 2]
-    if other >= 0:
-        b = solid_at(tape, rigid, other) + S_STEP + 3
-        x -= s[b]
-        y -= s[b + 1]
-        z -= s[b + 2]
-    return dt * length(x, y, z)
+def _spin(tape, s, rigid, i, field):
+    """Angular velocity in a field of a solid, or 0 where turning changes nothing: of balls, and of scenery (-1)."""
+    if i < 0 or tape[tape[rigid + SOLID_RECORDS] + SOLID * i + 7] & 4 == 0:
+        return 0.0, 0.0, 0.0
+    at = solid_at(tape, rigid, i) + field + 3
+    return s[at], s[at + 1], s[at + 2]
+
+
+@inner
+def _turn_far(tape, s, rigid, one, other, dt):
+    """Whether two solids turn far against each other within a step, by the velocities with which they drift."""
+    x, y, z = _spin(tape, s, rigid, one, S_STEP)
+    u, v, w = _spin(tape, s, rigid, other, S_STEP)
+    return dt * length(x - u, y - v, z - w) > _FAR
 
 
 @inner
@@ -102,9 +106,10 @@ def any_turns_far(tape, s, rigid, dt):
         at = solid_at(tape, rigid, i)
         p = at + S_VELOCITY + 3
         x, y, z = symmetric_times(s, at + S_INVERSE_INERTIA, s[p], s[p + 1], s[p + 2])
-        v = at + S_FREE + 3
+        u, v, w = _spin(tape, s, rigid, i, S_FREE)
         # Half of it: two may turn against each other.
-        if dt * length(s[v] + x, s[v + 1] + y, s[v + 2] + z) > 0.5 * _FAR:
+        far = dt * length(u + x, v + y, w + z) > 0.5 * _FAR
+        if far and tape[tape[rigid + SOLID_RECORDS] + SOLID * i + 7] & 4 != 0:
             return True
     return False
 
@@ -234,7 +239,7 @@ def find_late_contacts(tape, s, n, rigid, k, kept, count, dt, slop):
             a, b = pair_at(tape, n, rigid, i)
             points = 0
             one, other = _ends(tape, s, rigid, a, b)
-            if _angle(tape, s, rigid, one, other, dt) > _FAR:
+            if _turn_far(tape, s, rigid, one, other, dt):
                 points = _collide_pair(tape, s, rigid, a, b, -slop, 0.0)
             deepest = 0.0
             if points > 0:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from math import sqrt
 
-from ..integrators.rotor import turn_freely
+from ..integrators.rotor import ORDER, turn_freely
 from ..kernel import inner
 from ..math.lanes import splat
 from ..math.pointers import LANES
@@ -191,7 +191,7 @@ def scatter_velocities(tape, s, rigid, k):
 
 
 @inner
-def drift_solids(tape, s, rigid, k, dt):
+def drift_solids(tape, s, rigid, k, dt, order=ORDER):
     """Where the impulses of the base move all solids of lane k to within the step: eight of them turn at once."""
     solids = tape[rigid + SOLIDS]
     pack = tape[rigid + PACK_ROW]
@@ -213,7 +213,7 @@ def drift_solids(tape, s, rigid, k, dt):
                 s[LANES * (pack + 7 + c) + lane] = (
                     s[LANES * (tape[record + 6] + c) + k] if turns else 0.0
                 )
-        turn_freely(s, pack + 13, pack, pack + 4, pack + 7, splat(dt))
+        turn_freely(s, pack + 13, pack, pack + 4, pack + 7, splat(dt), order)
         for lane in range(min(LANES, solids - first)):
             i = first + lane
             at = solid_at(tape, rigid, i)
@@ -245,13 +245,13 @@ def drift_solids(tape, s, rigid, k, dt):
 
 
 @inner
-def drift_by_impulses(tape, s, rigid, k, dt):
+def drift_by_impulses(tape, s, rigid, k, dt, order=ORDER):
     """The same by the impulses of a solve."""
     for i in range(tape[rigid + SOLIDS]):
         at = solid_at(tape, rigid, i)
         for c in range(6):
             s[at + S_BASE + c] = s[at + S_VELOCITY + c]
-    drift_solids(tape, s, rigid, k, dt)
+    drift_solids(tape, s, rigid, k, dt, order)
 
 
 @inner

@@ -47,9 +47,10 @@ from ..model.tape import (
     H_ROTOR,
 )
 
-_ORDER = 10
+#: Order of the series at which what is left out is below rounding; and one that is near enough to see what overlaps.
+ORDER, ROUGH_ORDER = 10, 4
 #: Scratch rows of the series: L, w and q.
-ROTOR_ROWS = 10 * (_ORDER + 1)
+ROTOR_ROWS = 10 * (ORDER + 1)
 _LONGEST = 0.375
 _HALVINGS = 12
 
@@ -62,10 +63,10 @@ def parts_of(momentum: np.ndarray, inertia: np.ndarray, dt: float) -> int:
 
 
 @inner
-def _series(s, rotor, inverse):
+def _series(s, rotor, inverse, order):
     """Coefficients of L, w and q up to the order, from the first ones."""
     zero = splat(0.0)
-    for k in range(_ORDER):
+    for k in range(order):
         lx = zero
         ly = zero
         lz = zero
@@ -99,11 +100,11 @@ def _series(s, rotor, inverse):
 
 
 @inner
-def _sum_series(s, rotor, time):
+def _sum_series(s, rotor, time, order):
     """The quaternion at a time."""
-    row = rotor + 10 * _ORDER + 6
+    row = rotor + 10 * order + 6
     w, x, y, z = load_quaternion(s, row)
-    for _ in range(_ORDER):
+    for _ in range(order):
         row -= 10
         w = fma(w, time, load(s, row))
         x = fma(x, time, load(s, row + 1))
@@ -113,8 +114,8 @@ def _sum_series(s, rotor, time):
 
 
 @inner
-def turn_freely(s, rotor, turn, momentum, inverse, dt):
-    """Orientation (rows ``turn``) after a time without torque."""
+def turn_freely(s, rotor, turn, momentum, inverse, dt, order):
+    """Orientation (rows ``turn``) after a time without torque, by a series of some order: ORDER is exact."""
     one = splat(1.0)
     lx, ly, lz = load_vector(s, momentum)
     trace = load(s, inverse) + load(s, inverse + 2) + load(s, inverse + 5)
@@ -135,8 +136,8 @@ def turn_freely(s, rotor, turn, momentum, inverse, dt):
         store_vector(s, rotor + 3, *symmetric_product(s, inverse, mx, my, mz))
         store(s, rotor + 6, w)
         store_vector(s, rotor + 7, x, y, z)
-        _series(s, rotor, inverse)
-        store_unit_quaternion(s, turn, *_sum_series(s, rotor, part))
+        _series(s, rotor, inverse, order)
+        store_unit_quaternion(s, turn, *_sum_series(s, rotor, part, order))
         # A world that is through stays as it is, to the bit, however long its neighbours take.
         for k in range(4):
             row = rotor + 6 + k
@@ -180,7 +181,7 @@ def drift_bodies(tape, s, dt):
     for index in range(tape[at]):
         body = at + 1 + BODY * index
         add_scaled(s, tape[body], dt, *load_vector(s, tape[body + 2]))
-        turn_freely(s, tape[H_ROTOR], tape[body + 1], tape[body + 3], tape[body + 7], dt)
+        turn_freely(s, tape[H_ROTOR], tape[body + 1], tape[body + 3], tape[body + 7], dt, ORDER)
 
 
 @inner

@@ -253,8 +253,15 @@ class Rigid:
                 own,
             ]
         if thing.movable:
-            flags = 3 if thing.pivot is None else 2
+            flags = (3 if thing.pivot is None else 2) + 4 * (not self._is_round(thing))
         return [*c.bodies.rows(thing), flags, c.bodies.acceleration(thing)]
+
+    def _is_round(self, body: Body) -> bool:
+        """Whether all that a body is made of are balls about its origin."""
+        own = self.colliders.of(body)
+        return bool(
+            (self.colliders.kind[own] == SPHERE).all() and not self.colliders.place[own].any()
+        )
 
     def _collider(self, k: int, index: dict[int, int]) -> list[int]:
         """Record of a collider."""

@@ -20,7 +20,8 @@ from __future__ import annotations
 SETTLED, ISLAND_ENTRIES = 4, 5
 
 # Record of a solid (body or particle): rows of position, orientation, velocity, angular momentum, inverse mass, inertia
-# and its inverse, -1 where it has none; whether it moves (1) and turns (2); rows of its constant acceleration.
+# and its inverse, -1 where it has none; whether it moves (1), turns (2), and looks
+# other when it has turned (4); rows of its constant acceleration.
 SOLID = 9
 # Record of a collider: kind, solid or -1, its number, rows of a ground's plane or of a particle's radius, its group.
 COLLIDER = 5

@@ -11,6 +11,7 @@ from ..collision.contact_list import any_turns_far, find_late_contacts
 from ..collision.placement import place_colliders
 from ..constraints.contact_rows import contact_at, contact_ends, relative_velocity
 from ..constraints.solids import drift_by_impulses
+from ..integrators.rotor import ROUGH_ORDER
 from ..kernel import inner
 from ..math.pointers import doubles_at
 from ..model.rigid_layout import (
@@ -40,7 +41,7 @@ def meet_late(tape, s, n, rigid, k, kept, count, dt):
     for i in range(count):
         s[contact_at(tape, rigid, i) + C_LATE] = 0.0
     for _ in range(_TURNS):
-        drift_by_impulses(tape, s, rigid, k, dt)
+        drift_by_impulses(tape, s, rigid, k, dt, ROUGH_ORDER)
         place_colliders(tape, s, rigid, k, dt, S_END, S_END_ROTATION)
         count, found = find_late_contacts(tape, s, n, rigid, k, kept, count, dt, slop)
         if not found:
