@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol
 
 import mujoco
@@ -13,7 +13,7 @@ import pymunk
 import steelyard as sy
 from benchmarks.laboratory.engines import BrokenRunError
 from benchmarks.laboratory.problem import Peer
-from benchmarks.peers import mujoco_scenes
+from benchmarks.peers import drake, mujoco_scenes
 from benchmarks.peers.mujoco_bodies import BodyFlight, BodySettings
 from benchmarks.peers.rigid import Moving
 from benchmarks.scenes import Array, ParticleScene
@@ -253,6 +253,17 @@ def mujoco_bodies(scene: sy.Scene) -> dict[str, Peer]:
         return lambda dt: FlownBodies(scene, BodyFlight(scene, BodySettings(dt=dt, cone=cone)))
 
     return {f"MuJoCo {cone}": peer(cone) for cone in ("elliptic", "pyramidal")}
+
+
+def drake_bodies(
+    scene: sy.Scene, ways: Mapping[str, dict[str, Any]] = drake.WAYS
+) -> dict[str, Peer]:
+    """Peers of a scene of free bodies, one for each of Drake's ways; none where it is not installed."""
+
+    def peer(way: dict[str, Any]) -> Peer:
+        return lambda dt: FlownBodies(scene, drake.flight(scene, dt, way))
+
+    return {name: peer(way) for name, way in ways.items()} if drake.INSTALLED else {}
 
 
 class PymunkBodies(Pymunk):
