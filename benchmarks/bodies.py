@@ -1,4 +1,4 @@
-"""Rigid bodies beside MuJoCo on one core: a stack, a heap, a ragdoll; cost over the number of bodies; rays.
+"""Rigid bodies beside MuJoCo, and Drake where installed, on one core: a stack, a heap, a ragdoll; growth; rays.
 
 MuJoCo steps one world per model and is timed on some of the worlds; the engine steps all of them. What both are held
 to stands beside the cost: penetration, gaps of joints, and the largest gain of energy between looks.
@@ -15,12 +15,15 @@ import numpy as np
 import steelyard as sy
 from benchmarks import record
 from benchmarks.figures import Announce, Figure
+from benchmarks.peers import drake
 from benchmarks.peers.mujoco_bodies import BodyFlight, BodySettings
 
 STAGES = ("stack", "heap", "ragdoll", "growth", "broad phase", "rays")
 DT = 0.01
 Measured = dict[str, dict[str, float]]
 Readings = dict[str, Callable[[], float]]
+#: Of Drake, by name; none where it is not installed.
+WAYS = drake.WAYS if drake.INSTALLED else {}
 
 
 def run(*, quick: bool, output: Path, announce: Announce) -> list[Figure]:
@@ -97,12 +100,17 @@ def _stack(quick: bool) -> tuple[Any, list[Figure]]:
         ours.step(settle)
         worlds_of[name] = ours
         calls[name] = (lambda ours=ours: ours.step(steps), worlds * steps)
-    flights = {}
+    flights: dict[str, Any] = {}
     for cone in ("pyramidal", "elliptic"):
         flight = BodyFlight(stack(10), BodySettings(dt=DT, cone=cone))
         flight.step(settle)
         flights[f"MuJoCo, {cone}"] = flight
         calls[f"MuJoCo, {cone}"] = (lambda flight=flight: flight.step(20 * steps), 20 * steps)
+    for name, way in WAYS.items():
+        flight = drake.flight(stack(10), DT, way)
+        flight.step(settle)
+        flights[name] = flight
+        calls[name] = (lambda flight=flight: flight.step(20 * steps), 20 * steps)
     cost = _timed(calls, 1 if quick else 7)
     top = {name: float(flight.position[-1, 1]) for name, flight in flights.items()}
     deep = {name: flight.penetration for name, flight in flights.items()}
@@ -113,12 +121,13 @@ def _stack(quick: bool) -> tuple[Any, list[Figure]]:
     found = {
         name: {"per_step": cost[name], "penetration": deep[name], "top": top[name]} for name in cost
     }
-    best = min(cost[name] for name in flights)
+    theirs = [name for name in flights if name.startswith("MuJoCo")]
+    best = min(cost[name] for name in theirs)
     return found, [
         Figure(name="stack of ten: MuJoCo over ours, kept awake", measured=best / cost["awake"], at_least=5.0),
         Figure(name="stack of ten: MuJoCo over ours, as it is", measured=best / cost["asleep"], at_least=5.0),
         Figure(name="stack of ten: penetration", measured=deep["awake"], unit="m",
-               at_most=min(deep[name] for name in flights)),
+               at_most=min(deep[name] for name in theirs)),
         Figure(name="stack of ten: asleep over awake", measured=cost["asleep"] / cost["awake"], unit="",
                at_most=0.02),
     ]  # fmt: skip
@@ -134,8 +143,8 @@ def _read_world(world: sy.World) -> tuple[Callable[[], None], Readings]:
     return lambda: world.step(5), readings
 
 
-def _read_flight(flight: BodyFlight) -> tuple[Callable[[], None], Readings]:
-    """The same of MuJoCo."""
+def _read_flight(flight: Any) -> tuple[Callable[[], None], Readings]:
+    """The same of MuJoCo or Drake."""
     readings: Readings = {
         "energy": lambda: flight.energy,
         "penetration": lambda: flight.penetration,
@@ -185,9 +194,11 @@ def _heap(quick: bool) -> tuple[Any, list[Figure]]:
         world.bodies.orientation[:] = turns[:count]
         return world
 
-    def peer(index: int, dt: float, cone: Any) -> BodyFlight:
-        scene = heap(20, 1, turns[index])
-        return BodyFlight(scene, BodySettings(dt=dt, cone=cone))
+    def mujoco(index: int, dt: float, cone: Any) -> BodyFlight:
+        return BodyFlight(heap(20, 1, turns[index]), BodySettings(dt=dt, cone=cone))
+
+    def drake_flight(index: int, dt: float, way: Any) -> Any:
+        return drake.flight(heap(20, 1, turns[index]), dt, way)
 
     for name, solver in SOLVERS.items():
         for dt in (DT, 1 / 60):
@@ -198,18 +209,22 @@ def _heap(quick: bool) -> tuple[Any, list[Figure]]:
                 lambda solver=solver, dt=dt, steps=steps: start(solver, dt, worlds).step(steps),
                 worlds * seconds,
             )
-    for cone in ("elliptic", "pyramidal"):
-        for dt in (0.002, 0.005, DT):
-            steps = round(seconds / dt)
-            key = f"MuJoCo {cone}, dt {dt:.4f}"
-            each = [_fly(*_read_flight(peer(k, dt, cone)), steps // 5) for k in range(starts)]
-            found[key] = {name: max(one[name] for one in each) for name in each[0]}
+    # CENIC chooses its steps itself, below the largest: two of these will do.
+    peers = [
+        *((f"MuJoCo {cone}", mujoco, cone, dt) for cone in ("elliptic", "pyramidal") for dt in (0.002, 0.005, DT)),
+        *((name, drake_flight, way, dt) for name, way in WAYS.items() for dt in (0.005, DT)),
+    ]  # fmt: skip
+    for name, peer, how, dt in peers:
+        steps = round(seconds / dt)
+        key = f"{name}, dt {dt:.4f}"
+        each = [_fly(*_read_flight(peer(k, dt, how)), steps // 5) for k in range(starts)]
+        found[key] = {name: max(one[name] for one in each) for name in each[0]}
 
-            def fly(dt: float = dt, steps: int = steps, cone: str = cone) -> None:
-                for k in range(starts):
-                    peer(k, dt, cone).step(steps)
+        def fly(peer: Any = peer, how: Any = how, dt: float = dt, steps: int = steps) -> None:
+            for k in range(starts):
+                peer(k, dt, how).step(steps)
 
-            calls[key] = (fly, starts * seconds)
+        calls[key] = (fly, starts * seconds)
     cost = _timed(calls, 1 if quick else 3)
     for name in found:
         found[name]["per_second"] = cost[name]
@@ -219,7 +234,7 @@ def _heap(quick: bool) -> tuple[Any, list[Figure]]:
             able = {
                 ours: cost[theirs] / cost[ours]
                 for ours in found
-                if not ours.startswith("MuJoCo")
+                if not ours.startswith(("MuJoCo", "Drake"))
                 and all(found[ours][k] <= found[theirs][k] for k in ("penetration", "gain"))
             }
             best = max(able, key=lambda ours: able[ours], default=None)
@@ -233,6 +248,16 @@ def _heap(quick: bool) -> tuple[Any, list[Figure]]:
     ]
 
 
+#: Colours and lines of peers in the heap's picture; ours have the others.
+PEER_STYLES = {
+    "MuJoCo elliptic": ("#000000", "s--"),
+    "MuJoCo pyramidal": ("#888888", "s--"),
+    "Drake SAP": ("#000000", "^:"),
+    "Drake CENIC 1e-3": ("#555555", "v:"),
+    "Drake CENIC 1e-5": ("#999999", "D:"),
+}
+
+
 def draw_heap(found: Measured, path: Path) -> None:
     """Cost against penetration and against the gain of energy, of every method and step."""
     import matplotlib.pyplot as plt
@@ -243,14 +268,14 @@ def draw_heap(found: Measured, path: Path) -> None:
     for family in families:
         points = [entry for name, entry in found.items() if name.rpartition(", dt ")[0] == family]
         points.sort(key=lambda entry: entry["per_second"])
-        peer = family.startswith("MuJoCo")
+        colour, style = PEER_STYLES.get(family, (None, "o-"))
         for panel, measure in zip(panels, ("penetration", "gain"), strict=True):
             panel.plot(
                 [max(entry[measure], 1e-12) for entry in points],
                 [entry["per_second"] / 1e3 for entry in points],
-                "s--" if peer else "o-",
+                style,
                 label=family,
-                color=None if not peer else ("#000000" if "elliptic" in family else "#888888"),
+                color=colour,
             )
     for panel, label in zip(
         panels,
@@ -266,7 +291,9 @@ def draw_heap(found: Measured, path: Path) -> None:
             axis.set_minor_formatter(NullFormatter())
     panels[0].set_xticks([1e-4, 1e-3, 1e-2, 0.1], [".1 mm", "1 mm", "1 cm", "10 cm"])
     for panel in panels:
-        panel.set_yticks([2, 5, 10, 20], ["2", "5", "10", "20"])
+        low, high = panel.get_ylim()
+        ticks = [t for t in (1, 2, 5, 10, 20, 50, 100, 200, 500) if low <= t <= high]
+        panel.set_yticks(ticks, [str(t) for t in ticks])
     panels[1].legend(loc="center left", bbox_to_anchor=(1.02, 0.5), frameon=False)
     figure.suptitle(
         "Ten boxes and ten balls fall and come to rest: down and left is better", x=0.01, ha="left"

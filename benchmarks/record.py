@@ -28,6 +28,7 @@ PACKAGES = (
     "llvmlite",
     "gymnasium",
     "mujoco",
+    "drake",
     "pymunk",
     "stable-baselines3",
     "torch",

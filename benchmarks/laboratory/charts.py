@@ -20,6 +20,8 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7
 MARKS = ("o", "^", "D", "v", "P", "X")
 PEER_COLOURS = ("#000000", "#555555", "#999999")
 PEER_MARKS = ("s", "*", "h", "<")
+#: Of a peer's line, one for each engine: what one makes with several settings is then seen to be one's.
+PEER_LINES = ("--", "-.", ":")
 #: Errors are drawn within these bounds: below all is rounding, above it is another motion.
 SHOWN = (1e-16, 1.0)
 FRAME = 1.0 / 60.0
@@ -65,6 +67,7 @@ def draw(measured: Measured, path: Path, *, title: str, note: str) -> None:
             loc="center left",
             bbox_to_anchor=(1.02, 0.5),
             frameon=False,
+            handlelength=3.0,
         )
     figure.suptitle(title, x=0.01, y=1.0 - 0.15 / height, ha="left", va="top")
     figure.text(0.01, 0.08 / height, note, fontsize=8, color="#444444", va="bottom")
@@ -118,6 +121,7 @@ def _styles(measured: Measured) -> dict[str, Style]:
     listed = [entry.name for entry in sy.CANDIDATES]
     found: dict[str, Style] = {}
     peers = 0
+    engines: list[str] = []
     forms = 0
     for _, points in measured.values():
         for point in points:
@@ -127,7 +131,11 @@ def _styles(measured: Measured) -> dict[str, Style]:
             if point.peer:
                 colour = PEER_COLOURS[peers % len(PEER_COLOURS)]
                 mark = PEER_MARKS[peers % len(PEER_MARKS)]
-                found[name] = (colour, mark, "--", False)
+                engine = name.split()[0]
+                if engine not in engines:
+                    engines.append(engine)
+                line = PEER_LINES[engines.index(engine) % len(PEER_LINES)]
+                found[name] = (colour, mark, line, False)
                 peers += 1
             elif name in listed:
                 k = listed.index(name)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Protocol
 
 import mujoco
 import numpy as np
@@ -13,8 +13,9 @@ import pymunk
 import steelyard as sy
 from benchmarks.laboratory.engines import BrokenRunError
 from benchmarks.laboratory.problem import Peer
-from benchmarks.peers import mujoco_scenes
+from benchmarks.peers import drake, mujoco_scenes
 from benchmarks.peers.mujoco_bodies import BodyFlight, BodySettings
+from benchmarks.peers.rigid import Moving
 from benchmarks.scenes import Array, ParticleScene
 
 # By default MuJoCo writes each warning to a file of the working folder.
@@ -177,40 +178,64 @@ def pymunk_space(
     return {name: lambda dt: Pymunk(build, dt)}
 
 
-class MuJoCoBodies:
-    """A scene of free bodies in MuJoCo, seen by its landmarks.
+class Flight(Protocol):
+    """A rigid scene flown by another engine."""
+
+    def push(self, velocity: Array, spin: Array) -> None:
+        """Add to velocities [m/s] and spins [rad/s] (bodies, 3), in the world's axes."""
+
+    def step(self, steps: int) -> None:
+        """Advance.
+
+        Raises:
+            ArithmeticError: the engine cannot.
+        """
+
+    def saved(self) -> Array:
+        """All that the steps to come depend on."""
+
+    def restore(self, state: Array) -> None:
+        """Back to what was saved."""
+
+    @property
+    def moving(self) -> Moving:
+        """Places, orientations and their rates."""
+
+
+class FlownBodies:
+    """Free bodies in another engine, seen by their landmarks.
 
     Args:
-        scene: Bodies, a ground and collisions of all.
-        settings: How it is stepped.
+        scene: The bodies.
+        flight: The engine, with the bodies at rest where they start.
     """
 
-    def __init__(self, scene: sy.Scene, settings: BodySettings) -> None:
-        self.scene, self.settings = scene, settings
-        self.reset()
-
-    def reset(self) -> None:
-        """See ``Stepper``."""
-        self.flight = BodyFlight(self.scene, self.settings)
-        bodies = self.scene.bodies
-        self.flight.push(
+    def __init__(self, scene: sy.Scene, flight: Flight) -> None:
+        bodies = scene.bodies
+        flight.push(
             np.array([body.velocity for body in bodies]),
             np.array([body.angular_velocity for body in bodies]),
         )
+        self.flight, self.start = flight, flight.saved()
+
+    def reset(self) -> None:
+        """See ``Stepper``."""
+        self.flight.restore(self.start)
 
     def step(self, steps: int) -> None:
-        """See ``Stepper``."""
-        self.flight.step(steps)
+        """See ``Stepper``.
+
+        Raises:
+            BrokenRunError: the engine gave up.
+        """
+        try:
+            self.flight.step(steps)
+        except ArithmeticError as failure:
+            raise BrokenRunError(str(failure)) from failure
 
     def state(self) -> tuple[Array, Array]:
         """See ``Stepper``."""
-        data = self.flight.data
-        mujoco.mj_kinematics(self.flight.model, data)
-        count = len(self.scene.bodies)
-        turn = data.xmat[1 : count + 1].reshape(-1, 3, 3)
-        speed = data.qvel.reshape(count, 6)
-        spin = np.einsum("bij,bj->bi", turn, speed[:, 3:])
-        return _landmarks(data.xpos[1 : count + 1], turn, speed[:, :3], spin)
+        return _landmarks(*self.flight.moving)
 
 
 def _landmarks(place: Array, turn: Array, velocity: Array, spin: Array) -> tuple[Array, Array]:
@@ -225,9 +250,20 @@ def mujoco_bodies(scene: sy.Scene) -> dict[str, Peer]:
     """Peers of a scene of free bodies, one per cone of friction."""
 
     def peer(cone: str) -> Peer:
-        return lambda dt: MuJoCoBodies(scene, BodySettings(dt=dt, cone=cone))
+        return lambda dt: FlownBodies(scene, BodyFlight(scene, BodySettings(dt=dt, cone=cone)))
 
     return {f"MuJoCo {cone}": peer(cone) for cone in ("elliptic", "pyramidal")}
+
+
+def drake_bodies(
+    scene: sy.Scene, ways: Mapping[str, dict[str, Any]] = drake.WAYS
+) -> dict[str, Peer]:
+    """Peers of a scene of free bodies, one for each of Drake's ways; none where it is not installed."""
+
+    def peer(way: dict[str, Any]) -> Peer:
+        return lambda dt: FlownBodies(scene, drake.flight(scene, dt, way))
+
+    return {name: peer(way) for name, way in ways.items()} if drake.INSTALLED else {}
 
 
 class PymunkBodies(Pymunk):

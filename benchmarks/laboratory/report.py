@@ -15,7 +15,7 @@ from benchmarks.laboratory.problem import Problem
 
 NOTE = (
     "Down and left is better. Large marks: about 1/60 s. Hollow: a single world. "
-    "Dashed: other engines, one world. One core."
+    "Dashed, dash-dotted or dotted in grey: other engines, one world. One core."
 )
 
 

@@ -15,10 +15,10 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 import steelyard as sy
+from benchmarks.peers.rigid import UPRIGHT, JointGaps, Moving, turn
+from benchmarks.scenes import Array
 
 Form = Literal["tree", "equalities"]
-# From MuJoCo's z to the y along which our capsules lie and our grounds face.
-_UPRIGHT = Rotation.from_euler("x", -90, degrees=True)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,7 +52,7 @@ def build(scene: sy.Scene, settings: BodySettings) -> tuple[mujoco.MjModel, mujo
         plane = {
             "type": "plane",
             "size": "0 0 1",
-            "quat": _quaternion(_UPRIGHT),
+            "quat": _quaternion(UPRIGHT),
             "friction": friction,
         }
         ET.SubElement(world, "geom", plane)
@@ -67,7 +67,7 @@ def build(scene: sy.Scene, settings: BodySettings) -> tuple[mujoco.MjModel, mujo
             world if parent is None else elements[id(parent)], "body", name=f"body {index}"
         )
         element.set("pos", _text(_local(parent, np.array(body.position))))
-        element.set("quat", _quaternion(_relative(parent, _turn(body.orientation))))
+        element.set("quat", _quaternion(_relative(parent, turn(body.orientation))))
         if joint is None:
             ET.SubElement(element, "freejoint")
         else:
@@ -87,30 +87,25 @@ def _text(values: Any) -> str:
     return " ".join(repr(float(value)) for value in values)
 
 
-def _turn(quaternion: Any) -> Rotation:
-    """From (w, x, y, z)."""
-    return Rotation.from_quat(np.roll(np.array(quaternion), -1))
-
-
-def _quaternion(turn: Rotation) -> str:
+def _quaternion(rotation: Rotation) -> str:
     """As (w, x, y, z) in words."""
-    return _text(np.roll(turn.as_quat(), 1))
+    return _text(np.roll(rotation.as_quat(), 1))
 
 
 def _local(parent: sy.Body | None, place: np.ndarray) -> np.ndarray:
     if parent is None:
         return place
-    return np.asarray(_turn(parent.orientation).inv().apply(place - np.array(parent.position)))
+    return np.asarray(turn(parent.orientation).inv().apply(place - np.array(parent.position)))
 
 
-def _relative(parent: sy.Body | None, turn: Rotation) -> Rotation:
-    return turn if parent is None else _turn(parent.orientation).inv() * turn
+def _relative(parent: sy.Body | None, rotation: Rotation) -> Rotation:
+    return rotation if parent is None else turn(parent.orientation).inv() * rotation
 
 
 def _joint(joint: sy.BallJoint | sy.HingeJoint, body: sy.Body) -> dict[str, str]:
     found = {"type": "ball", "pos": _text(_local(body, np.array(joint.place)))}
     if isinstance(joint, sy.HingeJoint):
-        axis = _turn(body.orientation).inv().apply(np.array(joint.axis))
+        axis = turn(body.orientation).inv().apply(np.array(joint.axis))
         found |= {"type": "hinge", "axis": _text(axis)}
         if np.isfinite((joint.drive.low, joint.drive.high)).all():
             found |= {"limited": "true", "range": _text((joint.drive.low, joint.drive.high))}
@@ -118,7 +113,7 @@ def _joint(joint: sy.BallJoint | sy.HingeJoint, body: sy.Body) -> dict[str, str]
 
 
 def _geom(part: sy.Part, friction: float) -> dict[str, str]:
-    shape, turn = part.shape, _turn(part.orientation)
+    shape, own = part.shape, turn(part.orientation)
     found = {
         "pos": _text(part.offset), "density": repr(part.density),
         "friction": f"{friction!r} 0.005 0.0001",
@@ -126,13 +121,13 @@ def _geom(part: sy.Part, friction: float) -> dict[str, str]:
     if isinstance(shape, sy.Sphere):
         return found | {"type": "sphere", "size": repr(shape.radius)}
     if isinstance(shape, sy.Box):
-        return found | {"type": "box", "size": _text(shape.half_size), "quat": _quaternion(turn)}
+        return found | {"type": "box", "size": _text(shape.half_size), "quat": _quaternion(own)}
     assert isinstance(shape, sy.Capsule)
     size = _text((shape.radius, shape.half_length))
     return found | {
         "type": "capsule",
         "size": size,
-        "quat": _quaternion(turn * _UPRIGHT),
+        "quat": _quaternion(own * UPRIGHT),
     }
 
 
@@ -159,21 +154,46 @@ class BodyFlight:
         self.model, self.data = build(scene, settings)
         # A tree has its bodies in another order.
         self._index = [self.model.body(f"body {k}").id for k in range(len(scene.bodies))]
-        self._ends = [
-            [(scene.bodies.index(thing), place) for thing, place, _ in joint.ends]
-            for joint in scene.of(sy.BallJoint, sy.HingeJoint)
-        ]
+        self._gaps = JointGaps(scene)
+        self._kind = mujoco.mjtState.mjSTATE_INTEGRATION
 
     def push(self, velocity: np.ndarray, spin: np.ndarray) -> None:
         """Add to the velocities and spins (bodies, 3) of free bodies, in the world's axes."""
         for k in range(len(self.scene.bodies)):
-            turn = self.data.xmat[self._index[k]].reshape(3, 3)
+            axes = self.data.xmat[self._index[k]].reshape(3, 3)
             self.data.qvel[6 * k : 6 * k + 3] += velocity[k]
-            self.data.qvel[6 * k + 3 : 6 * k + 6] += turn.T @ spin[k]
+            self.data.qvel[6 * k + 3 : 6 * k + 6] += axes.T @ spin[k]
 
     def step(self, steps: int) -> None:
         """Advance."""
         mujoco.mj_step(self.model, self.data, nstep=steps)
+
+    def saved(self) -> Array:
+        """All that the steps to come depend on."""
+        state = np.empty(mujoco.mj_stateSize(self.model, self._kind))
+        mujoco.mj_getState(self.model, self.data, state, self._kind)
+        return state
+
+    def restore(self, state: Array) -> None:
+        """Back to what was saved."""
+        mujoco.mj_setState(self.model, self.data, state, self._kind)
+
+    @property
+    def moving(self) -> Moving:
+        """Of free bodies, now; a step leaves what follows from their coordinates where it started."""
+        mujoco.mj_kinematics(self.model, self.data)
+        turns = self._turns
+        speed = self.data.qvel.reshape(-1, 6)
+        return (
+            self.position,
+            turns,
+            speed[:, :3].copy(),
+            np.einsum("bij,bj->bi", turns, speed[:, 3:]),
+        )
+
+    @property
+    def _turns(self) -> Array:
+        return np.array(self.data.xmat[self._index].reshape(-1, 3, 3))
 
     @property
     def position(self) -> np.ndarray:
@@ -188,12 +208,7 @@ class BodyFlight:
     @property
     def gap(self) -> float:
         """Of the most open joint [m]."""
-        turns = self.data.xmat[self._index].reshape(-1, 3, 3)
-        worst = 0.0
-        for (a, at_a), (b, at_b) in self._ends:
-            apart = self.position[a] + turns[a] @ at_a - self.position[b] - turns[b] @ at_b
-            worst = max(worst, float(np.linalg.norm(apart)))
-        return worst
+        return self._gaps.most(self.position, self._turns)
 
     @property
     def energy(self) -> float:

@@ -5,6 +5,8 @@
 - A ball that falls rebounds with e of its speed, at times that follow from that.
 - Stacks of ten boxes stand, one under a top a thousand times as heavy.
 - Newton's cradle: the first ball swings as the pendulum whose angle is below 0, the last as if above.
+
+MuJoCo and Drake, where it is installed, are not asked to bounce: neither knows restitution.
 """
 
 from __future__ import annotations
@@ -18,8 +20,8 @@ import numpy as np
 from scipy.special import ellipj, ellipk
 
 import steelyard as sy
-from benchmarks.laboratory.peers import mujoco_bodies, pymunk_bodies
-from benchmarks.laboratory.problem import Motion, Problem, energy, trajectory
+from benchmarks.laboratory.peers import drake_bodies, mujoco_bodies, pymunk_bodies
+from benchmarks.laboratory.problem import Motion, Peer, Problem, energy, trajectory
 from benchmarks.scenes import Array
 
 STRETCH, STEPS = 0.1, (3, 6, 12, 24)
@@ -239,12 +241,15 @@ def problems() -> tuple[Problem, ...]:
             "ground a millimetre too low": partial(stack, *top, ground=-1e-3),
         }
 
+    def others(scene: sy.Scene) -> dict[str, Peer]:
+        return mujoco_bodies(scene) | drake_bodies(scene) | pymunk_bodies(scene)
+
     mass, ball = 1000.0, 1000.0 * 4.0 / 3.0 * math.pi * RADIUS**3
     small = 1000.0 * 4.0 / 3.0 * math.pi * BALL**3
     return (
         problem(
             "sliding block", sliding_block, sliding, 15, mass * GRAVITY,
-            mujoco_bodies(sliding_block()) | pymunk_bodies(sliding_block()),
+            others(sliding_block()),
             {
                 "friction 1 % off": partial(sliding_block, friction=1.01 * FRICTION),
                 "gravity 1 % off": partial(sliding_block, gravity=1.01 * GRAVITY),
@@ -253,7 +258,7 @@ def problems() -> tuple[Problem, ...]:
         ),
         problem(
             "rolling ball", rolling_ball, rolling, 15, 0.5 * ball * SPEED**2,
-            mujoco_bodies(rolling_ball()) | pymunk_bodies(rolling_ball()),
+            others(rolling_ball()),
             {
                 "friction 1 % off": partial(rolling_ball, friction=1.01 * FRICTION),
                 "no friction": partial(rolling_ball, friction=0.0),
@@ -272,13 +277,13 @@ def problems() -> tuple[Problem, ...]:
         ),
         problem(
             "stack of ten", stack, standing, 20, 10.0 * mass * GRAVITY,
-            mujoco_bodies(stack()) | pymunk_bodies(stack()),
+            others(stack()),
             off(),
             every=10,
         ),
         problem(
             "stack, top 1000 x heavier", partial(stack, 1000.0), standing, 20, 1010.0 * mass * GRAVITY,
-            mujoco_bodies(stack(1000.0)) | pymunk_bodies(stack(1000.0)),
+            others(stack(1000.0)),
             off(1000.0),
             every=10,
         ),

@@ -20,7 +20,7 @@ import mpmath
 import numpy as np
 
 import steelyard as sy
-from benchmarks.laboratory.peers import mujoco_document
+from benchmarks.laboratory.peers import drake_bodies, mujoco_document
 from benchmarks.laboratory.pendulums import DATA
 from benchmarks.laboratory.problem import Motion, Problem, energy, trajectory
 from benchmarks.scenes import Array
@@ -29,6 +29,12 @@ STRETCH, LOOKS = 0.5, tuple(range(1, 21))
 STORED = DATA / "top.npz"
 #: Moments of the free top, and its spin, about the unstable axis.
 INERTIA, SPIN = (1.0, 2.0, 3.0), (0.01, 5.0, 0.01)
+#: What Drake has for motion without contact, beside what it has for contact.
+DRAKES = {
+    "Drake SAP": {"scheme": "sap"},
+    "Drake CENIC 1e-7": {"scheme": "cenic", "accuracy": 1e-7},
+    "Drake RK5 1e-12": {"scheme": "runge_kutta5", "accuracy": 1e-12},
+}
 #: Mass, distance of the centre of mass, moments about that across and along the axis, tilt and spin of the heavy top.
 MASS, ARM, ACROSS, ALONG, TILT, RATE, GRAVITY = 1.0, 0.3, 0.03, 0.02, 0.5, 40.0, 9.81
 SITES = """<site name="o"/><site name="x" pos="1 0 0"/><site name="y" pos="0 1 0"/>
@@ -165,7 +171,8 @@ def problems() -> tuple[Problem, ...]:
                 particles=names,
                 integrators=integrators,
                 velocity=np.array([0.0, 0.0, 0.0, *SPIN]),
-            ),
+            )
+            | drake_bodies(free_top(), DRAKES),
             best="velocity Verlet",
             wrong={
                 "box inertia of .3 for 1/3": partial(free_top, inertia=(1.0, 2.0, 2.7)),
