@@ -77,10 +77,11 @@ def _unused(tape, s, row):
     """Rows from this one on that no world of the block uses: those of contacts behind the last that any has."""
     rigid = tape[H_RIGID]
     if rigid >= 0:
+        size = tape[rigid + STORED]
         place = row - tape[rigid + STORED_ROW]
-        left = STORED * tape[rigid + CAPACITY] - place
-        if place > 0 and left >= 0 and place % STORED == 0:
-            last = row - STORED + T_ID
+        left = size * tape[rigid + CAPACITY] - place
+        if place > 0 and left >= 0 and place % size == 0:
+            last = row - size + T_ID
             if not any_lane(load(s, last) > splat(0.0)):
                 return left
     return 0
@@ -126,13 +127,14 @@ def _forget_contacts(tape, s, loaded):
     if rigid >= 0:
         zero = splat(0.0)
         live = splat(1.0)
+        size = tape[rigid + STORED]
         row = tape[rigid + STORED_ROW]
-        end = row + STORED * tape[rigid + CAPACITY]
+        end = row + size * tape[rigid + CAPACITY]
         while row < end and (row < loaded or any_lane(live > zero)):
             live = select(load(s, row + T_ID) > zero, live, zero)
-            for field in range(row, row + STORED):
+            for field in range(row, row + size):
                 store(s, field, select(live > zero, load(s, field), zero))
-            row += STORED
+            row += size
 
 
 @inner

@@ -8,6 +8,7 @@ one, since a point that serves two lets stacks fall.
 
 from __future__ import annotations
 
+from ..constraints.brakes import has_brake, prepare_brake, release_brake
 from ..constraints.contact_rows import (
     contact_at,
     contact_ends,
@@ -21,6 +22,7 @@ from ..kernel import inner
 from ..math.pointers import LANES
 from ..model.rigid_layout import (
     C_BEFORE,
+    C_BRAKE_BEFORE,
     C_COMPLIANCE,
     C_EARLIER,
     C_FRICTION,
@@ -33,6 +35,8 @@ from ..model.rigid_layout import (
     C_PLACE,
     C_REBOUND,
     C_RESTITUTION,
+    C_ROLLING,
+    C_SPINNING,
     CAPACITY,
     COLLIDER,
     COLLIDER_RECORDS,
@@ -55,6 +59,7 @@ from ..model.rigid_layout import (
     SOLIDS,
     STORED,
     STORED_ROW,
+    T_BRAKE,
     T_HELD,
     T_ID,
     T_IMPULSE,
@@ -155,6 +160,10 @@ def _put_contact(tape, s, n, rigid, k, a, b, source, place):
     s[c + C_ID] = _id(tape, rigid, a, b, s[source + C_ID])
     s[c + C_RESTITUTION] = s[LANES * tape[meeting] + k]
     s[c + C_FRICTION] = s[LANES * tape[meeting + 1] + k]
+    release_brake(s, c)
+    if tape[meeting + 2] >= 0:
+        s[c + C_SPINNING] = s[LANES * tape[meeting + 2] + k]
+        s[c + C_ROLLING] = s[LANES * tape[meeting + 3] + k]
     n[tape[rigid + END_A] + place] = one
     n[tape[rigid + END_B] + place] = other
 
@@ -215,6 +224,7 @@ def _begin_late(tape, s, n, rigid, i, deepest, dt):
     s[c + C_HELD] = 0.0
     s[c + C_REBOUND] = 0.0
     s[c + C_COMPLIANCE] = 0.0
+    release_brake(s, c)
     # An impulse along another normal would be none of a start.
     for axis in range(3):
         s[c + C_IMPULSE + axis] = 0.0
@@ -292,13 +302,16 @@ def prepare_contacts(tape, s, n, rigid, count):
         c = contact_at(tape, rigid, i)
         a = solid_at(tape, rigid, n[tape[rigid + END_A] + i])
         b = n[tape[rigid + END_B] + i]
-        prepare_rows(s, c, a, solid_at(tape, rigid, b) if b >= 0 else -1, S_PLACE)
+        b = solid_at(tape, rigid, b) if b >= 0 else -1
+        prepare_rows(s, c, a, b, S_PLACE)
+        if has_brake(s, c):
+            prepare_brake(s, c, a, b)
 
 
 @inner
 def _stored(tape, rigid, j, field, k):
     """Entry of a stored contact's field in lane k."""
-    return LANES * (tape[rigid + STORED_ROW] + STORED * j + field) + k
+    return LANES * (tape[rigid + STORED_ROW] + tape[rigid + STORED] * j + field) + k
 
 
 @inner
@@ -309,6 +322,12 @@ def _take(tape, s, n, rigid, k, c, j):
     s[c + C_BEFORE] = t0 if t0 > 0.0 else 0.0
     s[c + C_BEFORE + 1] = t1
     s[c + C_BEFORE + 2] = t2
+    if has_brake(s, c):
+        at = _stored(tape, rigid, j, T_BRAKE, k)
+        t0, t1, t2 = contact_vector(s, c, s[at], s[at + LANES], s[at + 2 * LANES])
+        s[c + C_BRAKE_BEFORE] = t0
+        s[c + C_BRAKE_BEFORE + 1] = t1
+        s[c + C_BRAKE_BEFORE + 2] = t2
     s[c + C_REBOUND] = s[_stored(tape, rigid, j, T_REBOUND, k)]
     s[c + C_HELD] = s[_stored(tape, rigid, j, T_HELD, k)]
     s[c + C_EARLIER] = 1.0
@@ -329,6 +348,8 @@ def match_contacts(tape, s, n, rigid, k, count, kept):
         s[c + C_BEFORE] = 0.0
         s[c + C_BEFORE + 1] = 0.0
         s[c + C_BEFORE + 2] = 0.0
+        for axis in range(3):
+            s[c + C_BRAKE_BEFORE + axis] = 0.0
         s[c + C_REBOUND] = 0.0
         s[c + C_HELD] = 0.0
         s[c + C_EARLIER] = 0.0

@@ -9,7 +9,8 @@ import numpy as np
 
 from ..collision.manifold import IDS
 from ..model.parameters import RIGID
-from ..model.rigid_layout import STORED, T_ID, T_IMPULSE, T_PLACE
+from ..model.rigid_layout import STORED, T_BRAKE, T_ID, T_IMPULSE, T_PLACE
+from ..model.tape import H_RIGID
 from ..queries.placed import owners_in
 
 if TYPE_CHECKING:
@@ -28,6 +29,7 @@ class Contacts:
         place: [m], (worlds, capacity, 3).
         impulse: on the first thing [N s], in the second half of the last step, (worlds, capacity, 3).
         force: the same over the time in which it acted [N].
+        torque: of spinning and rolling on the first thing [N m].
     """
 
     things: tuple[Any, ...]
@@ -36,6 +38,7 @@ class Contacts:
     place: np.ndarray
     impulse: np.ndarray
     force: np.ndarray
+    torque: np.ndarray
 
     @property
     def count(self) -> np.ndarray:
@@ -56,18 +59,25 @@ def contacts_of(world: World) -> Contacts:
             f"World.contacts: {world.method.solver} keeps no list of contacts in this scene; it must be one for bodies "
             "that touch something. Use ProximalNewton()."
         )
-    stored = world._view(RIGID, "contacts").reshape(world.worlds, -1, STORED)
+    rigid = world.model.tape[H_RIGID]
+    size = int(world.model.tape[rigid + STORED])
+    stored = world._view(RIGID, "contacts").reshape(world.worlds, -1, size)
     # What lies behind the last is of no meaning.
     taken = np.logical_and.accumulate(stored[..., T_ID] > 0.0, axis=1)
     pair = np.where(taken, (stored[..., T_ID].astype(np.int64) - 1) // IDS, 0)
     things, index = owners_in(world)
     first, second = (np.where(taken, index[ends], -1) for ends in divmod(pair, len(index)))
     impulse = stored[..., T_IMPULSE : T_IMPULSE + 3].copy()
+    turning = np.zeros_like(impulse)
+    if size > T_BRAKE:
+        turning = stored[..., T_BRAKE : T_BRAKE + 3].copy()
+    duration = 0.5 * world.method.substep
     return Contacts(
         things=things,
         first=first,
         second=second,
         place=stored[..., T_PLACE : T_PLACE + 3].copy(),
         impulse=impulse,
-        force=impulse / (0.5 * world.method.substep),
+        force=impulse / duration,
+        torque=turning / duration,
     )

@@ -147,6 +147,13 @@ class Rigid:
         return usual if self.tree else min(sum(each), usual)
 
     @property
+    def stored(self) -> int:
+        """Numbers of the state per contact."""
+        generators = self._c.scene.of(Ground, Collisions)
+        brakes = any(generator.brakes for generator in generators)
+        return at.STORED_WITH_BRAKES if brakes else at.STORED_USUALLY
+
+    @property
     def active(self) -> bool:
         """Whether there is anything to hold."""
         return self.touching or bool(self.joints)
@@ -156,7 +163,7 @@ class Rigid:
         c = self._c
         if not self.active:
             return
-        c.state((RIGID, "contacts"), np.zeros(at.STORED * self.capacity))
+        c.state((RIGID, "contacts"), np.zeros(self.stored * self.capacity))
         c.state((RIGID, "overflow"), [0.0])
         c.state((RIGID, "bound"), np.zeros(sum(map(_rows, self.joints))))
         for joint in self.joints:
@@ -225,14 +232,13 @@ class Rigid:
                 rows += joint[first + 1 : first + at.DRIVE]
         return sorted({row for row in rows if row >= 0})
 
-    def _surface(self, generator: Any) -> tuple[int, int]:
-        """Rows of a generator's restitution and friction, -1 without one."""
-        if generator is None:
-            return -1, -1
-        return (
-            self._c.parameter(generator, "restitution", generator.restitution),
-            self._c.parameter(generator, "friction", generator.friction),
-        )
+    def _surface(self, generator: Any) -> list[int]:
+        """Rows of a generator's numbers, -1 for what it does not have."""
+        names: tuple[str, ...] = ()
+        if generator is not None:
+            names = ("restitution", "friction", *generator.brakes)
+        rows = [self._c.parameter(generator, name, getattr(generator, name)) for name in names]
+        return rows + [-1] * (at.MEETING - len(rows))
 
     def _solid(self, thing: Body | Particle) -> list[int]:
         """Record of what contacts push."""
@@ -333,6 +339,7 @@ class Rigid:
         words[at.COLLIDERS] = len(self.colliders)
         words[at.PAIRS] = len(self.pairs)
         words[at.PLANES] = self.planes
+        words[at.STORED] = self.stored
         words[at.GROUPS] = len(self.meetings)
         words[at.PARTINGS] = len(self.partings)
         words[at.BOXES] = -1

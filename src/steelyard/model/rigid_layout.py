@@ -12,9 +12,9 @@ from __future__ import annotations
     SOLIDS, SOLID_RECORDS, COLLIDERS, COLLIDER_RECORDS, PAIRS, PAIR_RECORDS, NUMBERS, STORED_ROW, CAPACITY,
     OVERFLOW_ROW, START_ROW, SOLID_WORK, PLACED_WORK, CONTACT_WORK, POINTS_WORK, NARROW_WORK, MATRIX_ROW, VECTOR_ROW,
     JOINTS, JOINT_RECORDS, ROW_WORK, FRAME_WORK, BOUND_ROW, PACK_ROW, REST_ROW, WAKERS, WAKER_RECORDS, SOLVE,
-    PLANES, GROUPS, MEETING_RECORDS, PARTING_RECORDS, PARTINGS, BOXES,
+    PLANES, GROUPS, MEETING_RECORDS, PARTING_RECORDS, PARTINGS, BOXES, STORED,
     DEGREES, ADJACENT, ORDER, LOCAL, FIRST, STARTS, END_A, END_B, LIST, MATCHED, HELD, ISLAND, TREES, NEAR, RIGID_WORDS,
-) = range(49)  # fmt: skip
+) = range(50)  # fmt: skip
 
 # The island at hand: numbers of solids, contacts, joints and the factor's rows, and whether the solve settled.
 SETTLED, ISLAND_ENTRIES = 4, 5
@@ -27,8 +27,8 @@ SOLID = 9
 COLLIDER = 5
 # Record of a pair, where a scene lists them all: colliders a and b, of which a can move.
 PAIR = 2
-# Record of how a group meets another: rows of restitution and friction, or -1.
-MEETING = 2
+# Record of how a group meets another: rows of restitution and friction, and of that of spinning and rolling, or -1.
+MEETING = 4
 # Record of a joint: locked coordinates as bits, solids a and b (or -1: the world), its numbers, first of its rows and
 # how many, state rows of whether it is broken, of its force and of its torque, rows of the force and torque that break
 # it and of its length, number of drives; and of each drive: coordinate, rows of speed, strength, limits, stiffness,
@@ -77,12 +77,24 @@ SOLID_ENTRIES = 136
 # restitution, compliance, least normal velocity, impulses of the last pass and of this one along normal and tangents,
 # velocity and its change, shift of the normal velocity by friction, rebound, the derivative of the impulse, mobility,
 # normal impulse that is there already, whether it was known before,
-# and if it was only found where the step ends, one more than its pair may be deep there, below 0 before it is solved.
+# and if it was only found where the step ends, one more than its pair may be deep there, below 0 before it is solved;
+# of friction of spinning and rolling the lengths, the normal impulse that limits it, impulses of the last pass and of
+# this one about normal and tangents, angular velocity (in sweeps: mobilities) and its change, and mobility.
 C_NORMAL, C_GAP, C_PLACE, C_ID, C_TANGENT, C_BINORMAL, C_ARM_A, C_ARM_B = 0, 3, 4, 7, 8, 11, 14, 17
 C_FRICTION, C_RESTITUTION, C_COMPLIANCE, C_LEAST, C_BEFORE, C_IMPULSE = 20, 21, 22, 23, 24, 27
 C_SPEED, C_CHANGE = 30, 33
 C_SHIFT, C_REBOUND, C_DERIVATIVE, C_WEIGHT, C_HELD, C_EARLIER, C_LATE = 36, 37, 38, 44, 45, 46, 47
-CONTACT_ENTRIES = 48
+C_SPINNING, C_ROLLING, C_LIMIT, C_BRAKE_BEFORE, C_BRAKE, C_BRAKE_SPEED, C_BRAKE_CHANGE = (
+    48,
+    49,
+    50,
+    51,
+    54,
+    57,
+    60,
+)
+C_BRAKE_WEIGHT = 63
+CONTACT_ENTRIES = 64
 
 # Numbers of a joint's end: place and axes in its solid. Entries of a row of a joint: direction of its force, of its
 # torques on a and b, wanted velocity, compliance, impulse of the last pass and of this one, bounds of it, velocity and
@@ -104,9 +116,10 @@ DRIVE_ROWS = 4
 OFF, EQUAL, LIMIT, MOTOR, SPRING = 0.0, 1.0, 2.0, 3.0, 4.0
 
 # Rows of the state per contact: its id + 1, or 0 for none; impulse and place in the world; rebound; and the normal
-# impulse of the position stage on what was open, on which the velocity stage has friction.
-STORED = 9
-T_ID, T_IMPULSE, T_PLACE, T_REBOUND, T_HELD = 0, 1, 4, 7, 8
+# impulse of the position stage on what was open, on which the velocity stage has friction; in scenes with friction of
+# spinning or rolling its impulse in the world too.
+STORED_USUALLY, STORED_WITH_BRAKES = 9, 12
+T_ID, T_IMPULSE, T_PLACE, T_REBOUND, T_HELD, T_BRAKE = 0, 1, 4, 7, 8, 9
 
 # Rows of the state per solid that may sleep (``solvers.sleep``), and behind them all one more, of what they share.
 REST = 3

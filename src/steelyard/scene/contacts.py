@@ -17,6 +17,19 @@ _SURFACE: dict[str, checks.Rule] = {
     "restitution": checks.Limit(least=0.0, most=1.0, remedy="1 loses no energy."),
     "friction": checks.Limit(least=0.0, remedy="0 is frictionless."),
 }
+_LENGTH = checks.Limit(least=0.0, remedy="Leave it out where none is modelled.")
+_BRAKES: dict[str, checks.Rule] = {"spinning_friction": _LENGTH, "rolling_friction": _LENGTH}
+
+
+def _declare_brakes(generator: Ground | Collisions) -> tuple[str, ...]:
+    """Names of the friction of spinning and rolling where one of them is given; the other is 0 then."""
+    if all(getattr(generator, name) is None for name in _BRAKES):
+        return ()
+    for name in _BRAKES:
+        if getattr(generator, name) is None:
+            setattr(generator, name, 0.0)
+    checks.numbers(generator, *_BRAKES)
+    return tuple(_BRAKES)
 
 
 @dataclass(eq=False, kw_only=True)
@@ -28,6 +41,9 @@ class Ground:
         normal: direction out of the ground; made a unit vector.
         restitution: rebound speed over impact speed, in [0, 1].
         friction: Coulomb coefficient, at least 0.
+        rolling_friction: length [m]: the torque against rolling is at most this times the normal force; None, as by
+            default, where none is modelled.
+        spinning_friction: the same against turning about the normal.
         particles: particles and bodies that can touch it; all movable ones of the scene by default. Each costs
             three rows in a solver: name only those that can get there.
     """
@@ -36,15 +52,22 @@ class Ground:
     normal: checks.Vector = (0.0, 1.0, 0.0)
     restitution: float = 0.0
     friction: float = 0.0
+    rolling_friction: float | None = None
+    spinning_friction: float | None = None
     particles: Sequence[Particle | Body] | None = None
 
-    LIMITS: ClassVar[dict[str, checks.Rule]] = _SURFACE | {
-        "height": checks.Limit(remedy="Give the plane's distance from the origin."),
-        "normal": checks.Direction(remedy="Use (0, 1, 0) for up."),
-    }
+    LIMITS: ClassVar[dict[str, checks.Rule]] = (
+        _SURFACE
+        | _BRAKES
+        | {
+            "height": checks.Limit(remedy="Give the plane's distance from the origin."),
+            "normal": checks.Direction(remedy="Use (0, 1, 0) for up."),
+        }
+    )
 
     def __post_init__(self) -> None:
         checks.numbers(self, "height", "restitution", "friction")
+        self.brakes = _declare_brakes(self)
         checks.vectors(self, "normal")
         normal = self.LIMITS["normal"].check("Ground", "normal", np.asarray(self.normal))
         self.normal = tuple(normal.tolist())
@@ -127,17 +150,23 @@ class Collisions:
     Args:
         restitution: rebound speed over approach speed, in [0, 1].
         friction: Coulomb coefficient, at least 0. A particle does not turn: friction acts at its centre.
+        rolling_friction: length [m]: the torque against rolling is at most this times the normal force; None, as by
+            default, where none is modelled.
+        spinning_friction: the same against turning about the normal.
         particles: particles and bodies that can meet; all of the scene by default.
     """
 
     restitution: float = 0.0
     friction: float = 0.0
+    rolling_friction: float | None = None
+    spinning_friction: float | None = None
     particles: Sequence[Particle | Body] | None = None
 
-    LIMITS: ClassVar[dict[str, checks.Rule]] = _SURFACE
+    LIMITS: ClassVar[dict[str, checks.Rule]] = _SURFACE | _BRAKES
 
     def __post_init__(self) -> None:
         checks.numbers(self, "restitution", "friction")
+        self.brakes = _declare_brakes(self)
         check_particles(self, "particles", others=(Body,))
 
     def pairs_of(self, everything: Sequence[Any]) -> list[tuple[Any, Any]]:

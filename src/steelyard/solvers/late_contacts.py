@@ -16,6 +16,8 @@ from ..kernel import inner
 from ..math.pointers import doubles_at
 from ..model.rigid_layout import (
     C_BEFORE,
+    C_BRAKE,
+    C_BRAKE_BEFORE,
     C_IMPULSE,
     C_LATE,
     C_REBOUND,
@@ -50,6 +52,7 @@ def meet_late(tape, s, n, rigid, k, kept, count, dt):
             c = contact_at(tape, rigid, i)
             for axis in range(3):
                 s[c + C_BEFORE + axis] = s[c + C_IMPULSE + axis]
+                s[c + C_BRAKE_BEFORE + axis] = s[c + C_BRAKE + axis]
         solve_islands(tape, s, n, rigid, count, k, LATE)
         for i in range(count):
             c = contact_at(tape, rigid, i)

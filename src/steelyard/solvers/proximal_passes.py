@@ -4,17 +4,25 @@ from __future__ import annotations
 
 from math import sqrt
 
+from ..constraints.brakes import brake_at, brake_compliance, has_brake, relative_spin
 from ..constraints.contact_rows import contact_at, contact_ends, length, relative_velocity
 from ..constraints.joint_rows import joint_at, joint_solids, row_at, row_impulse, row_velocity
 from ..kernel import inner
 from ..math.pointers import doubles_at
 from ..model.rigid_layout import (
     C_BEFORE,
+    C_BRAKE,
+    C_BRAKE_BEFORE,
+    C_BRAKE_WEIGHT,
     C_COMPLIANCE,
     C_FRICTION,
+    C_HELD,
     C_IMPULSE,
+    C_LIMIT,
+    C_ROLLING,
     C_SHIFT,
     C_SPEED,
+    C_SPINNING,
     C_WEIGHT,
     HELD,
     ISLAND,
@@ -74,8 +82,10 @@ def _polish(tape, s, n, rigid, size, contacts, joints, rows):
             for k in range(3):
                 if taken < 0:
                     s[c + C_IMPULSE + k] = s[c + C_BEFORE + k]
+                    s[c + C_BRAKE + k] = s[c + C_BRAKE_BEFORE + k]
                 else:
                     s[c + C_BEFORE + k] = s[c + C_IMPULSE + k]
+                    s[c + C_BRAKE_BEFORE + k] = s[c + C_BRAKE + k]
         if taken <= 0:
             break
 
@@ -87,6 +97,13 @@ def _unsettled(s, c, u0, u1, u2):
     return s[c + C_COMPLIANCE] * length(
         l0 - s[c + C_BEFORE], l1 - s[c + C_BEFORE + 1], l2 - s[c + C_BEFORE + 2]
     )
+
+
+@inner
+def _unsettled_brake(s, c, l0, l1, l2):
+    """The same of spinning and rolling, given what the pass would have."""
+    t = c + C_BRAKE_BEFORE
+    return brake_compliance(s, c) * length(l0 - s[t], l1 - s[t + 1], l2 - s[t + 2])
 
 
 @inner
@@ -112,6 +129,7 @@ def _keep_last(tape, s, n, rigid, contacts, joints):
         c = contact_at(tape, rigid, n[tape[rigid + LIST] + j])
         for k in range(3):
             s[c + C_IMPULSE + k] = s[c + C_BEFORE + k]
+            s[c + C_BRAKE + k] = s[c + C_BRAKE_BEFORE + k]
     for j in range(joints):
         joint = joint_at(tape, rigid, n[tape[rigid + HELD] + j])
         row = row_at(tape, rigid, tape[joint + 4])
@@ -136,6 +154,11 @@ def _pass(tape, s, n, rigid, size, contacts, joints, rows, what):
         u0, u1, u2 = relative_velocity(s, c, a, b, S_VELOCITY)
         s[c + C_SHIFT] = sqrt(u1 * u1 + u2 * u2)
         change = max(change, _unsettled(s, c, u0, u1, u2))
+        if has_brake(s, c):
+            s[c + C_LIMIT] = s[c + C_BEFORE] + s[c + C_HELD]
+            w0, w1, w2 = relative_spin(s, c, a, b, S_VELOCITY)
+            l0, l1, l2 = brake_at(s, c, w0, w1, w2)
+            change = max(change, _unsettled_brake(s, c, l0, l1, l2))
     for j in range(joints):
         change = max(change, _unsettled_joint(tape, s, rigid, n[tape[rigid + HELD] + j]))
     if change <= _AT_REST:
@@ -172,8 +195,16 @@ def _pass(tape, s, n, rigid, size, contacts, joints, rows, what):
             if s[c + C_IMPULSE] > 0.0:
                 shift = max(shift, s[c + C_FRICTION] * abs(slip - s[c + C_SHIFT]))
             s[c + C_SHIFT] = slip
+            if has_brake(s, c):
+                t = c + C_BRAKE
+                change = max(change, _unsettled_brake(s, c, s[t], s[t + 1], s[t + 2]))
+                limit = s[c + C_IMPULSE] + s[c + C_HELD]
+                reach = s[c + C_SPINNING] + s[c + C_ROLLING]
+                shift = max(shift, s[c + C_BRAKE_WEIGHT] * reach * abs(limit - s[c + C_LIMIT]))
+                s[c + C_LIMIT] = limit
             for k in range(3):
                 s[c + C_BEFORE + k] = s[c + C_IMPULSE + k]
+                s[c + C_BRAKE_BEFORE + k] = s[c + C_BRAKE + k]
         for j in range(joints):
             joint = joint_at(tape, rigid, n[tape[rigid + HELD] + j])
             row = row_at(tape, rigid, tape[joint + 4])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ..constraints.brakes import add_torque, has_brake
 from ..constraints.contact_rows import accelerate, add_impulse, contact_at, contact_ends
 from ..constraints.joint_rows import (
     add_row_impulse,
@@ -14,6 +15,8 @@ from ..kernel import inner
 from ..math.pointers import LANES
 from ..model.rigid_layout import (
     C_BEFORE,
+    C_BRAKE,
+    C_BRAKE_BEFORE,
     C_COMPLIANCE,
     C_IMPULSE,
     C_LATE,
@@ -72,6 +75,9 @@ def begin_velocity(tape, s, n, rigid, size, contacts, joints, warm):
             add_impulse(
                 s, c, a, b, S_PUSH, s[c + C_BEFORE], s[c + C_BEFORE + 1], s[c + C_BEFORE + 2]
             )
+            if has_brake(s, c):
+                t = c + C_BRAKE_BEFORE
+                add_torque(s, c, a, b, S_PUSH, s[t], s[t + 1], s[t + 2])
         for j in range(joints):
             joint = joint_at(tape, rigid, n[tape[rigid + HELD] + j])
             a, b = joint_solids(tape, rigid, joint)
@@ -93,6 +99,7 @@ def forget_impulses(tape, s, n, rigid, contacts, joints, compliance):
         s[c + C_SHIFT] = 0.0
         for k in range(3):
             s[c + C_BEFORE + k] = 0.0
+            s[c + C_BRAKE_BEFORE + k] = 0.0
     for j in range(joints):
         joint = joint_at(tape, rigid, n[tape[rigid + HELD] + j])
         row = row_at(tape, rigid, tape[joint + 4])
@@ -126,6 +133,9 @@ def _keep_impulses(tape, s, n, rigid, size, contacts):
         add_impulse(
             s, c, a, b, S_VELOCITY, s[c + C_IMPULSE], s[c + C_IMPULSE + 1], s[c + C_IMPULSE + 2]
         )
+        if has_brake(s, c):
+            t = c + C_BRAKE
+            add_torque(s, c, a, b, S_VELOCITY, s[t], s[t + 1], s[t + 2])
 
 
 @inner

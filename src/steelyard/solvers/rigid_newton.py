@@ -7,6 +7,13 @@ from __future__ import annotations
 
 from math import sqrt
 
+from ..constraints.brakes import (
+    add_torque,
+    brake_at,
+    brake_derivative,
+    has_brake,
+    relative_spin,
+)
 from ..constraints.contact_rows import add_impulse, contact_at, contact_ends, relative_velocity
 from ..constraints.joint_rows import (
     add_row_impulse,
@@ -25,6 +32,9 @@ from ..model.rigid_layout import (
     C_ARM_B,
     C_BEFORE,
     C_BINORMAL,
+    C_BRAKE,
+    C_BRAKE_CHANGE,
+    C_BRAKE_SPEED,
     C_CHANGE,
     C_COMPLIANCE,
     C_DERIVATIVE,
@@ -114,6 +124,8 @@ def _evaluate(tape, s, n, rigid, size, contacts, joints):
         at = c + C_DERIVATIVE
         s[at], s[at + 1], s[at + 2], s[at + 3], s[at + 4], s[at + 5] = d
         add_impulse(s, c, a, b, S_PUSH, l0, l1, l2)
+        if has_brake(s, c):
+            _evaluate_brake(s, c, a, b)
     for j in range(joints):
         _evaluate_joint(tape, s, rigid, n[tape[rigid + HELD] + j])
     error = 0.0
@@ -144,6 +156,17 @@ def _evaluate(tape, s, n, rigid, size, contacts, joints):
         turning = s[at + S_TURNS] * (x * fx + y * fy + z * fz)
         scale += turning + _angular_square(s, at, S_PUSH)
     return sqrt(error), sqrt(scale)
+
+
+@inner
+def _evaluate_brake(s, c, a, b):
+    """Impulse of a contact's spinning and rolling at the velocity, on the solids."""
+    w0, w1, w2 = relative_spin(s, c, a, b, S_VELOCITY)
+    n, t, u = brake_at(s, c, w0, w1, w2)
+    for k in range(3):
+        s[c + C_BRAKE_SPEED + k] = w0 if k == 0 else (w1 if k == 1 else w2)
+        s[c + C_BRAKE + k] = n if k == 0 else (t if k == 1 else u)
+    add_torque(s, c, a, b, S_PUSH, n, t, u)
 
 
 @inner
@@ -288,8 +311,47 @@ def _assemble(tape, s, h, n, rigid, size, contacts, joints, rows):
                 _add_columns(h, row + SIX * (k - f), t0, t1, t2, bx, by, bz, both, 1.0)
                 if k > i:
                     _add_columns(h, row + SIX * (i - f), t0, t1, t2, x, y, z, moves, -1.0)
+        if has_brake(s, c):
+            _assemble_brake(tape, s, h, n, rigid, contact, matrix, work)
     for j in range(joints):
         _assemble_joint(tape, s, h, n, rigid, n[tape[rigid + HELD] + j], matrix, work)
+
+
+@inner
+def _assemble_brake(tape, s, h, n, rigid, contact, matrix, work):
+    """Add how a contact's spinning and rolling give to the angular parts of its solids' blocks."""
+    c = contact_at(tape, rigid, contact)
+    w = c + C_BRAKE_SPEED
+    nn, d11, d12, d22 = brake_derivative(s, c, s[w], s[w + 1], s[w + 2])
+    a = n[tape[rigid + END_A] + contact]
+    b = n[tape[rigid + END_B] + contact]
+    for k in range(3):
+        t = s[c + C_TANGENT + k]
+        u = s[c + C_BINORMAL + k]
+        x = nn * s[c + C_NORMAL + k]
+        y = d11 * t + d12 * u
+        z = d12 * t + d22 * u
+        for j in range(3):
+            h[work + k, j] = (
+                x * s[c + C_NORMAL + j] + y * s[c + C_TANGENT + j] + z * s[c + C_BINORMAL + j]
+            )
+    i = n[tape[rigid + LOCAL] + a]
+    turns = s[solid_at(tape, rigid, a) + S_TURNS]
+    _add_turning(tape, h, n, rigid, matrix, work, i, i, turns)
+    if b >= 0:
+        k = n[tape[rigid + LOCAL] + b]
+        both = s[solid_at(tape, rigid, b) + S_TURNS]
+        _add_turning(tape, h, n, rigid, matrix, work, k, k, both)
+        _add_turning(tape, h, n, rigid, matrix, work, max(i, k), min(i, k), -turns * both)
+
+
+@inner
+def _add_turning(tape, h, n, rigid, matrix, work, i, k, share):
+    """Add a share of a symmetric matrix in three rows of h to the angular part of block (i, k)."""
+    row = matrix + n[tape[rigid + STARTS] + i] + SIX * (k - n[tape[rigid + FIRST] + i])
+    for x in range(3):
+        for y in range(3):
+            h[row + 3 + x, 3 + y] += share * h[work + x, y]
 
 
 @inner
@@ -351,6 +413,13 @@ def _slope(tape, s, n, rigid, contacts, joints, start, rise, step):
             s[c + C_SPEED + 2] + step * d2,
         )
         slope -= l0 * d0 + l1 * d1 + l2 * d2
+        if has_brake(s, c):
+            w = c + C_BRAKE_SPEED
+            d = c + C_BRAKE_CHANGE
+            l0, l1, l2 = brake_at(
+                s, c, s[w] + step * s[d], s[w + 1] + step * s[d + 1], s[w + 2] + step * s[d + 2]
+            )
+            slope -= l0 * s[d] + l1 * s[d + 1] + l2 * s[d + 2]
     for j in range(joints):
         joint = joint_at(tape, rigid, n[tape[rigid + HELD] + j])
         row = row_at(tape, rigid, tape[joint + 4])
@@ -390,6 +459,11 @@ def _line_search(tape, s, n, rigid, size, contacts, joints):
         s[c + C_CHANGE] = d0
         s[c + C_CHANGE + 1] = d1
         s[c + C_CHANGE + 2] = d2
+        if has_brake(s, c):
+            d0, d1, d2 = relative_spin(s, c, a, b, S_STEP)
+            s[c + C_BRAKE_CHANGE] = d0
+            s[c + C_BRAKE_CHANGE + 1] = d1
+            s[c + C_BRAKE_CHANGE + 2] = d2
     for j in range(joints):
         joint = joint_at(tape, rigid, n[tape[rigid + HELD] + j])
         a, b = joint_solids(tape, rigid, joint)

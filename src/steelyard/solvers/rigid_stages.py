@@ -17,6 +17,7 @@ from ..collision.contact_list import (
     prepare_contacts,
 )
 from ..collision.placement import place_colliders
+from ..constraints.brakes import has_brake, release_brake
 from ..constraints.contact_rows import contact_at, contact_ends, relative_velocity, world_vector
 from ..constraints.joints import (
     POSITIONS,
@@ -39,6 +40,8 @@ from ..math.lanes import load, splat, store
 from ..math.pointers import LANES, doubles_at
 from ..model.rigid_layout import (
     C_BEFORE,
+    C_BRAKE,
+    C_BRAKE_BEFORE,
     C_COMPLIANCE,
     C_EARLIER,
     C_FRICTION,
@@ -70,6 +73,7 @@ from ..model.rigid_layout import (
     START_ROW,
     STORED,
     STORED_ROW,
+    T_BRAKE,
     T_HELD,
     T_ID,
     T_IMPULSE,
@@ -145,10 +149,23 @@ class RigidSolver(BodySettings):
 
 
 @inner
+def _store_brake(s, c, at):
+    """Impulse of spinning and rolling, if a contact has one, behind its other numbers."""
+    x = 0.0
+    y = 0.0
+    z = 0.0
+    if has_brake(s, c):
+        x, y, z = world_vector(s, c, s[c + C_BRAKE], s[c + C_BRAKE + 1], s[c + C_BRAKE + 2])
+    s[at + LANES * T_BRAKE] = x
+    s[at + LANES * (T_BRAKE + 1)] = y
+    s[at + LANES * (T_BRAKE + 2)] = z
+
+
+@inner
 def _store_contacts(tape, s, n, rigid, k, count, kept):
     """Ids, impulses, places and rebounds of the contacts at hand, for the next stage, behind those that are kept."""
     for j in range(tape[rigid + CAPACITY] - kept):
-        at = LANES * (tape[rigid + STORED_ROW] + STORED * (kept + j)) + k
+        at = LANES * (tape[rigid + STORED_ROW] + tape[rigid + STORED] * (kept + j)) + k
         if j < count:
             c = contact_at(tape, rigid, j)
             s[at] = s[c + C_ID] + 1.0
@@ -162,6 +179,8 @@ def _store_contacts(tape, s, n, rigid, k, count, kept):
                 s[at + LANES * (T_PLACE + i)] = s[c + C_PLACE + i]
             s[at + LANES * T_REBOUND] = s[c + C_REBOUND]
             s[at + LANES * T_HELD] = s[c + C_HELD]
+            if tape[rigid + STORED] > T_BRAKE:
+                _store_brake(s, c, at)
         else:
             # What lies behind the last is not looked at.
             s[at + LANES * T_ID] = 0.0
@@ -243,6 +262,7 @@ def _position_stage(tape, s, n, rigid, k, dt):
         s[c + C_EARLIER] = 0.0 if opened else 1.0
         if opened:
             s[c + C_FRICTION] = 0.0
+            release_brake(s, c)
     begin_joints(tape, s, rigid, k, dt, POSITIONS)
     swept = numbers[N_SWEEPS] > 0.0
     soft = numbers[N_HERTZ] > 0.0
@@ -297,6 +317,7 @@ def _velocity_stage(tape, s, n, rigid, k, dt):
             # Closed within this step: nothing is known yet of what bears it.
             for axis in range(3):
                 s[c + C_BEFORE + axis] = 0.0
+                s[c + C_BRAKE_BEFORE + axis] = 0.0
         # What is open does not act: it would have to approach at more than light.
         s[c + C_LEAST] = s[c + C_REBOUND] if closed else -1e30
         s[c + C_COMPLIANCE] = 0.0
@@ -323,6 +344,7 @@ def _push_apart(tape, s, n, rigid, k, count, dt, slop):
         c = contact_at(tape, rigid, i)
         gap = s[c + C_GAP]
         s[c + C_LEAST] = min(-_SHARE * gap / dt, _FASTEST) if gap < -slop else -max(gap, 0.0) / dt
+        release_brake(s, c)
     begin_joints(tape, s, rigid, k, dt, PUSHES)
     solve_islands(tape, s, n, rigid, count, k, PUSH)
     move_solids(tape, s, rigid, k, dt)

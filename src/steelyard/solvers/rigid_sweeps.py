@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from math import sqrt
 
+from ..constraints.brakes import brake_mobility, has_brake, limit_brake, relative_spin
 from ..constraints.contact_rows import (
     contact_at,
     contact_ends,
@@ -24,12 +25,16 @@ from ..model.rigid_layout import (
     C_ARM_B,
     C_BEFORE,
     C_BINORMAL,
+    C_BRAKE,
+    C_BRAKE_BEFORE,
+    C_BRAKE_SPEED,
     C_COMPLIANCE,
     C_DERIVATIVE,
     C_FRICTION,
     C_HELD,
     C_IMPULSE,
     C_LEAST,
+    C_LIMIT,
     C_NORMAL,
     C_TANGENT,
     HELD,
@@ -146,12 +151,44 @@ def _begin(tape, s, n, rigid, contacts, joints):
         s[c + C_DERIVATIVE + 1] = mean + sqrt(half * half + across * across)
         # So far over the mobility.
         s[c + C_COMPLIANCE] *= s[c + C_DERIVATIVE]
+        if has_brake(s, c):
+            _begin_brake(s, c, a, b)
     for j in range(joints):
         joint = joint_at(tape, rigid, n[tape[rigid + HELD] + j])
         row = row_at(tape, rigid, tape[joint + 4])
         for _ in range(tape[joint + 5]):
             s[row + J_IMPULSE] = s[row + J_BEFORE]
             row += ROW_ENTRIES
+
+
+@inner
+def _begin_brake(s, c, a, b):
+    """The same of spinning and rolling: mobilities about the normal, and about both tangents together."""
+    for k in range(3):
+        s[c + C_BRAKE + k] = s[c + C_BRAKE_BEFORE + k]
+    s[c + C_BRAKE_SPEED] = brake_mobility(s, c, a, b, C_NORMAL)
+    one = brake_mobility(s, c, a, b, C_TANGENT)
+    # At most the sum, and for a ball twice too much, which takes sweeps alone.
+    s[c + C_BRAKE_SPEED + 1] = one + brake_mobility(s, c, a, b, C_BINORMAL)
+
+
+@inner
+def _sweep_brake(s, c, a, b):
+    """Spinning and rolling of one contact."""
+    s[c + C_LIMIT] = s[c + C_IMPULSE] + s[c + C_HELD]
+    n = s[c + C_BRAKE]
+    t = s[c + C_BRAKE + 1]
+    u = s[c + C_BRAKE + 2]
+    w0, w1, w2 = relative_spin(s, c, a, b, S_VELOCITY)
+    across = s[c + C_BRAKE_SPEED + 1]
+    l0, l1, l2 = limit_brake(s, c, n - w0 / s[c + C_BRAKE_SPEED], t - w1 / across, u - w2 / across)
+    s[c + C_BRAKE] = l0
+    s[c + C_BRAKE + 1] = l1
+    s[c + C_BRAKE + 2] = l2
+    x, y, z = world_vector(s, c, l0 - n, l1 - t, l2 - u)
+    _move(s, a, 0.0, 0.0, 0.0, x, y, z)
+    if b >= 0:
+        _move(s, b, 0.0, 0.0, 0.0, -x, -y, -z)
 
 
 @inner
@@ -186,6 +223,8 @@ def _sweep_contact(s, c, a, b):
         s[c + C_IMPULSE + 1] = t1
         s[c + C_IMPULSE + 2] = t2
         _push(s, c, a, b, 0.0, t1 - l1, t2 - l2)
+    if has_brake(s, c):
+        _sweep_brake(s, c, a, b)
 
 
 @inner
@@ -276,10 +315,14 @@ def settle_contact(tape, s, n, rigid):
     _begin(tape, s, n, rigid, 1, 0)
     for _ in range(_SETTLING):
         l0, l1, l2 = s[c + C_IMPULSE], s[c + C_IMPULSE + 1], s[c + C_IMPULSE + 2]
+        b0, b1, b2 = s[c + C_BRAKE], s[c + C_BRAKE + 1], s[c + C_BRAKE + 2]
         _sweep_contact(s, c, a, b)
         change = length(s[c + C_IMPULSE] - l0, s[c + C_IMPULSE + 1] - l1, s[c + C_IMPULSE + 2] - l2)
         size = length(s[c + C_IMPULSE], s[c + C_IMPULSE + 1], s[c + C_IMPULSE + 2])
-        if change <= _SETTLED * size:
+        t = c + C_BRAKE
+        braked = length(s[t] - b0, s[t + 1] - b1, s[t + 2] - b2)
+        still = not has_brake(s, c) or braked <= _SETTLED * length(s[t], s[t + 1], s[t + 2])
+        if change <= _SETTLED * size and still:
             return True
     return False
 

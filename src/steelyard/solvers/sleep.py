@@ -187,15 +187,15 @@ def keep_sleeping_contacts(tape, s, rigid, k):
     kept = 0
     if tape[rigid + REST_ROW] >= 0:
         for j in range(tape[rigid + CAPACITY]):
-            at = LANES * (tape[rigid + STORED_ROW] + STORED * j) + k
+            at = LANES * (tape[rigid + STORED_ROW] + tape[rigid + STORED] * j) + k
             if s[at] == 0.0:
                 break
             a, b = colliders_of_pair(tape, rigid, int(s[at] - 1.0) // IDS)
             one = solid_of(tape, rigid, a)
             if _sleeps(tape, s, rigid, one) and _sleeps(tape, s, rigid, solid_of(tape, rigid, b)):
                 if kept < j:
-                    to = LANES * (tape[rigid + STORED_ROW] + STORED * kept) + k
-                    for field in range(STORED):
+                    to = LANES * (tape[rigid + STORED_ROW] + tape[rigid + STORED] * kept) + k
+                    for field in range(tape[rigid + STORED]):
                         value = s[to + LANES * field]
                         s[to + LANES * field] = s[at + LANES * field]
                         s[at + LANES * field] = value
