@@ -35,9 +35,9 @@ _ALONG_X = (math.sqrt(0.5), 0.0, 0.0, -math.sqrt(0.5))
 #: Every way to hold bodies, one line each.
 CASES: dict[str, Any] = {
     "proximal Newton": sy.ProximalNewton(rest_time=None),
-    "Gauss-Seidel x 10": sy.GaussSeidel(10),
-    "Gauss-Seidel x 30": sy.GaussSeidel(30),
-    "worst first": sy.WorstFirst(),
+    "Gauss-Seidel x 10": sy.GaussSeidel(10, rest_time=None),
+    "Gauss-Seidel x 30": sy.GaussSeidel(30, rest_time=None),
+    "worst first": sy.WorstFirst(rest_time=None),
     "soft step x 4": sy.SoftStep(substeps=4, rest_time=None),
     "soft step x 8": sy.SoftStep(substeps=8, rest_time=None),
 }
