@@ -173,6 +173,7 @@ def _pass(tape, s, n, rigid, size, contacts, joints, rows, what):
     moved = False
     settled = False
     near = True
+    slips = True
     passes = int(numbers[N_PASSES])
     for turn in range(_MORE * passes):
         taken = minimise(tape, s, n, rigid, size, contacts, joints, rows, tolerance, iterations)
@@ -215,12 +216,13 @@ def _pass(tape, s, n, rigid, size, contacts, joints, rows, what):
                     s[row + J_BEFORE] = value
                 row += ROW_ENTRIES
         settled = what == CHANGES or (change <= numbers[N_IMPULSE] and shift <= numbers[N_SHIFT])
-        near = change <= _NEAR and shift <= _NEAR
+        slips = shift <= _NEAR
+        near = change <= _NEAR and slips
         if settled or (near and turn + 1 >= passes):
             break
     if moved and settled and size <= _FEW and joints == 0:
         _polish(tape, s, n, rigid, size, contacts, joints, rows)
-    return settled or near
+    return settled or slips
 
 
 @inner
