@@ -216,6 +216,20 @@ def test_a_top_a_thousand_times_heavier(offset):
     assert np.abs(world.bodies.velocity).max() < 1e-9
 
 
+@pytest.mark.parametrize(("count", "sinks"), [(3, 1e-3), (20, 2e-2)])
+def test_a_top_a_million_times_heavier_is_held(count, sinks):
+    """No pass can settle what is so stiff: the next step goes on where it ended."""
+    scene = sy.Scene()
+    for i in range(count):
+        box(scene, 0, 0.5 + i, density=1e9 if i == count - 1 else 1e3)
+    world = sy.World(on_ground(scene))
+    start = world.bodies.position.copy()
+    world.step(300)
+    assert np.abs(world.bodies.position - start).max() < sinks
+    assert np.abs(world.bodies.velocity).max() < 1e-6
+    assert world.health[0] == 0
+
+
 def test_four_hundred_to_one_on_two_small_ones():
     scene = sy.Scene()
     box(scene, -0.6, 0.25, half=(0.25, 0.25, 0.25))

@@ -32,6 +32,7 @@ from ..model.rigid_layout import (
     C_IMPULSE,
     C_LATE,
     C_LEAST,
+    C_MOVED,
     C_PLACE,
     C_REBOUND,
     C_RESTITUTION,
@@ -222,6 +223,7 @@ def _begin_late(tape, s, n, rigid, i, deepest, dt):
     s[c + C_EARLIER] = 0.0
     s[c + C_FRICTION] = 0.0
     s[c + C_HELD] = 0.0
+    s[c + C_MOVED] = 0.0
     s[c + C_REBOUND] = 0.0
     s[c + C_COMPLIANCE] = 0.0
     release_brake(s, c)
@@ -352,6 +354,7 @@ def match_contacts(tape, s, n, rigid, k, count, kept):
             s[c + C_BRAKE_BEFORE + axis] = 0.0
         s[c + C_REBOUND] = 0.0
         s[c + C_HELD] = 0.0
+        s[c + C_MOVED] = 0.0
         s[c + C_EARLIER] = 0.0
         wanted = s[c + C_ID] + 1.0
         for step in range(old - kept):

@@ -29,6 +29,7 @@ from ..model.rigid_layout import (
     S_MIDDLE,
     S_MOVES,
     S_PLACE,
+    S_PUSH,
     S_ROTATION,
     S_STEP,
     S_TURN,
@@ -312,16 +313,41 @@ def _invert(s, at, out):
 
 
 @inner
-def kinetic_energy(tape, s, rigid, field):
-    """Of all solids by a six-vector of velocities [J]."""
+def kinetic_energy(tape, s, rigid, k, share):
+    """Of all solids of lane k [J], with a share of the impulses of the base, where ``drift_solids`` has moved them."""
     total = 0.0
+    record = tape[rigid + SOLID_RECORDS]
     for i in range(tape[rigid + SOLIDS]):
         at = solid_at(tape, rigid, i)
-        v = at + field
-        square = s[v] * s[v] + s[v + 1] * s[v + 1] + s[v + 2] * s[v + 2]
-        x, y, z = symmetric_times(s, at + S_INERTIA, s[v + 3], s[v + 4], s[v + 5])
-        turning = x * s[v + 3] + y * s[v + 4] + z * s[v + 5]
-        total += 0.5 * (s[at + S_MOVES] * s[at + S_MASS] * square + s[at + S_TURNS] * turning)
+        if s[at + S_MOVES] != 0.0:
+            for c in range(3):
+                v = s[LANES * (tape[record + 2] + c) + k]
+                v += share * s[at + S_INVERSE] * s[at + S_BASE + c]
+                total += 0.5 * s[at + S_MASS] * v * v
+        if s[at + S_TURNS] != 0.0:
+            # In the frame of the body, whose inertia no solve changes.
+            for c in range(3):
+                turned = 0.0
+                for j in range(3):
+                    row = LANES * (tape[record + 3] + j) + k
+                    momentum = s[row] + share * s[at + S_BASE + 3 + j]
+                    turned += s[at + S_END_ROTATION + 3 * j + c] * momentum
+                s[at + S_PUSH + c] = turned
+            m = tape[record + 6]
+            x = s[at + S_PUSH]
+            y = s[at + S_PUSH + 1]
+            z = s[at + S_PUSH + 2]
+            total += 0.5 * (
+                s[LANES * m + k] * x * x
+                + s[LANES * (m + 2) + k] * y * y
+                + s[LANES * (m + 5) + k] * z * z
+            )
+            total += (
+                s[LANES * (m + 1) + k] * x * y
+                + s[LANES * (m + 3) + k] * x * z
+                + s[LANES * (m + 4) + k] * y * z
+            )
+        record += SOLID
     return total
 
 

@@ -79,7 +79,8 @@ SOLID_ENTRIES = 136
 # normal impulse that is there already, whether it was known before,
 # and if it was only found where the step ends, one more than its pair may be deep there, below 0 before it is solved;
 # of friction of spinning and rolling the lengths, the normal impulse that limits it, impulses of the last pass and of
-# this one about normal and tangents, angular velocity (in sweeps: mobilities) and its change, and mobility.
+# this one about normal and tangents, angular velocity (in sweeps: mobilities) and its change, and mobility; and whether
+# the solve before changed the impulses of its island.
 C_NORMAL, C_GAP, C_PLACE, C_ID, C_TANGENT, C_BINORMAL, C_ARM_A, C_ARM_B = 0, 3, 4, 7, 8, 11, 14, 17
 C_FRICTION, C_RESTITUTION, C_COMPLIANCE, C_LEAST, C_BEFORE, C_IMPULSE = 20, 21, 22, 23, 24, 27
 C_SPEED, C_CHANGE = 30, 33
@@ -93,8 +94,8 @@ C_SPINNING, C_ROLLING, C_LIMIT, C_BRAKE_BEFORE, C_BRAKE, C_BRAKE_SPEED, C_BRAKE_
     57,
     60,
 )
-C_BRAKE_WEIGHT = 63
-CONTACT_ENTRIES = 64
+C_BRAKE_WEIGHT, C_MOVED = 63, 64
+CONTACT_ENTRIES = 65
 
 # Numbers of a joint's end: place and axes in its solid. Entries of a row of a joint: direction of its force, of its
 # torques on a and b, wanted velocity, compliance, impulse of the last pass and of this one, bounds of it, velocity and

@@ -48,8 +48,9 @@ from .block_cholesky import SIX
 from .islands import UNSEEN, gather_island, join_all
 
 # What is solved for: ALL impulses; CHANGES of those of joints, one pass of which more follow; a PUSH from rest; or,
-# where contacts came LATE, all again of their islands, of which others keep the base.
-ALL, CHANGES, PUSH, LATE = range(4)
+# where contacts came LATE, all again of their islands, of which others keep the base; or SOFTLY, all with contacts that
+# give way.
+ALL, CHANGES, PUSH, LATE, SOFTLY = range(5)
 
 
 @inner
@@ -166,7 +167,7 @@ def solve_islands(tape, s, n, rigid, count, k, what):
 
     Args:
         count: number of contacts that count.
-        what: ALL, CHANGES, PUSH or LATE.
+        what: ALL, CHANGES, PUSH, LATE or SOFTLY.
     """
     join_all(tape, s, n, rigid, count)
     for seed in range(tape[rigid + SOLIDS]):

@@ -50,6 +50,7 @@ from ..model.rigid_layout import (
     C_ID,
     C_IMPULSE,
     C_LEAST,
+    C_MOVED,
     C_PLACE,
     C_REBOUND,
     C_RESTITUTION,
@@ -84,9 +85,9 @@ from ..model.tape import COUNT, H_BLOCKS, H_DT, H_RIGID
 from ..stage import Stage, stage
 from .blows import pass_blows, start_velocities
 from .body_settings import BodySettings
-from .joint_closing import close_over_step, drift_as_solved, join_again
+from .joint_closing import close_over_step, drift_as_solved, drift_closed, join_again
 from .late_contacts import meet_late
-from .rigid_islands import ALL, PUSH, solve_islands
+from .rigid_islands import ALL, PUSH, SOFTLY, solve_islands
 from .sleep import (
     all_asleep,
     fall_asleep,
@@ -107,6 +108,8 @@ _CLOSED = 1e-10
 # A gap [m] that nothing closes; and in place of what is held, that the gap was no larger when the step began.
 _AT_REST = 1e-8
 _TOUCHED = -1.0
+# Besides, that a solve has just changed impulses: taken from the mark of what touches, or in place of none.
+_CHANGED = 1.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -258,6 +261,7 @@ def _position_stage(tape, s, n, rigid, k, dt):
         s[c + C_COMPLIANCE] = 0.0
         # Friction on what is open follows where it is closed: across the gap it would have a lever that is not there.
         opened = gap > slop or (gap > _AT_REST and s[c + C_BEFORE] == 0.0)
+        s[c + C_MOVED] = 1.0 if s[c + C_HELD] == _CHANGED else 0.0
         s[c + C_HELD] = 0.0
         s[c + C_EARLIER] = 0.0 if opened else 1.0
         if opened:
@@ -286,13 +290,20 @@ def _position_stage(tape, s, n, rigid, k, dt):
             drift_as_solved(tape, s, rigid, k, dt)
         else:
             closed = close_over_step(tape, s, n, rigid, k, dt, taut)
+            if not closed and count > 0:
+                # Contacts that limbs wedge push ever harder, pass by pass, and turn joints out of reach.
+                gather_solids(tape, s, rigid, k)
+                begin_joints(tape, s, rigid, k, dt, POSITIONS)
+                solve_islands(tape, s, n, rigid, count, k, SOFTLY)
+                closed = close_over_step(tape, s, n, rigid, k, dt, tautness(tape, s, rigid, k, dt))
+            drift_closed(tape, s, rigid, k)
     scatter_velocities(tape, s, rigid, k)
     for i in range(count):
         c = contact_at(tape, rigid, i)
         if s[c + C_EARLIER] == 0.0:
             s[c + C_HELD] = s[c + C_IMPULSE]
         elif s[c + C_GAP] <= _AT_REST:
-            s[c + C_HELD] = _TOUCHED
+            s[c + C_HELD] = _TOUCHED - _CHANGED * s[c + C_MOVED]
     _store_contacts(tape, s, n, rigid, k, count, kept)
     store_joints(tape, s, rigid, k, dt, False)
     if not closed:
@@ -309,9 +320,10 @@ def _velocity_stage(tape, s, n, rigid, k, dt):
     for i in range(count):
         c = contact_at(tape, rigid, i)
         closed = s[c + C_GAP] <= _CLOSED or s[c + C_BEFORE] > 0.0
-        if s[c + C_HELD] == _TOUCHED:
+        if s[c + C_HELD] <= _TOUCHED:
             # What carries nothing may drift by rounding, but must bear when it is asked to.
             closed = closed or s[c + C_GAP] <= _AT_REST
+            s[c + C_MOVED] = 1.0 if s[c + C_HELD] < _TOUCHED else 0.0
             s[c + C_HELD] = 0.0
         elif s[c + C_HELD] > 0.0:
             # Closed within this step: nothing is known yet of what bears it.
@@ -327,7 +339,8 @@ def _velocity_stage(tape, s, n, rigid, k, dt):
     solve_islands(tape, s, n, rigid, count, k, ALL)
     scatter_velocities(tape, s, rigid, k)
     for i in range(count):
-        s[contact_at(tape, rigid, i) + C_HELD] = 0.0
+        c = contact_at(tape, rigid, i)
+        s[c + C_HELD] = _CHANGED * s[c + C_MOVED]
     _store_contacts(tape, s, n, rigid, k, count, kept)
     store_joints(tape, s, rigid, k, dt, True)
     fall_asleep(tape, s, n, rigid, k, count, dt)
