@@ -38,6 +38,8 @@ _WORK = _OUT + ALL_POINTS * POINT
 MEMORY = _WORK + WORK
 #: Colliders from which on a tree is made (below, planting it takes what it saves).
 MANY = 4
+# Boxes about what is placed are larger by this, over place and size, than rounding makes them smaller.
+_ROUNDING = 1e-15
 # Numbers of a hit: way, gap, normal, place.
 HIT = 8
 
@@ -177,6 +179,13 @@ def _cast_one(m, kind_a, kind_b, x, y, z, dx, dy, dz, reach, hit):
 
 
 @inner
+def _half_box(placed, kind, k):
+    """Half the length [m] along an axis of the world of a box that holds a placed collider, rounding or not."""
+    half = half_extent(placed, kind, 0, k)
+    return half + _ROUNDING * (abs(placed[k]) + half)
+
+
+@inner
 def plant(kinds, placed, allowed, n, s):
     """A tree of the allowed colliders of one world that have an end, in all of two arrays."""
     leaves = kinds.shape[0]
@@ -185,7 +194,7 @@ def plant(kinds, placed, allowed, n, s):
         if allowed[i] and kinds[i] != HALF_SPACE:
             own = box_of(0, i)
             for k in range(3):
-                half = half_extent(placed[i], kinds[i], 0, k)
+                half = _half_box(placed[i], kinds[i], k)
                 s[own + k] = placed[i, k] - half
                 s[own + 3 + k] = placed[i, k] + half
             insert_leaf(n, 0, s, 0, leaves, i)
@@ -245,7 +254,7 @@ def cast_many(
             for k in range(3):
                 ray[k] = query[w, c, k]
                 ray[3 + k] = direction[w, c, k]
-                half[k] = half_extent(query[w, c], kind, 0, k)
+                half[k] = _half_box(query[w, c], kind, k)
             for k in range(PLACED):
                 m[k] = query[w, c, k]
             best = reach[w, c]
@@ -323,7 +332,7 @@ def overlap_many(
             for k in range(PLACED):
                 m[k] = query[w, c, k]
             for k in range(3):
-                half = half_extent(query[w, c], kind, 0, k)
+                half = _half_box(query[w, c], kind, k)
                 boxes[box + k] = query[w, c, k] - half
                 boxes[box + 3 + k] = query[w, c, k] + half
             waiting = 0
