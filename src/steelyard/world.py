@@ -41,7 +41,7 @@ from .state import (
     strike,
 )
 from .stepping import WHOLE_STEP, advance_blocks, launch, start_again
-from .triggers import Events, events_of, watch
+from .triggers import Events, events_of, poses, watch
 from .written import evaluate_forces, generate_contacts
 
 
@@ -145,8 +145,8 @@ class World:
             self._prepare()
         steps *= self.method.substeps
         if self._split or self._watched:
-            for _ in range(steps):
-                self._step_split()
+            for k in range(steps):
+                self._step_split(k % self.method.substeps == 0)
         else:
             self._run(steps, WHOLE_STEP)
 
@@ -168,8 +168,12 @@ class World:
     def _chunk(self, thread: int, first: int, last: int, steps: int, phase: int) -> None:
         advance_blocks(self._launch[thread], first, last, steps, phase)
 
-    def _step_split(self) -> None:
-        """One step in parts, user-written forces and contacts evaluated in between; then triggers look."""
+    def _step_split(self, fresh: bool) -> None:
+        """One substep in parts, user-written forces and contacts evaluated in between; then triggers look.
+
+        ``fresh``: it is the first of its step.
+        """
+        start = poses(self) if self._watched else None
         generate_contacts(self)
         written = self.scene.of(UserForce)
         shares = self.method.integrator.evaluations if written else (None,)
@@ -177,8 +181,8 @@ class World:
             if share is not None:
                 evaluate_forces(self, share * self.method.substep)
             self._run(1, 1 << part if part < len(shares) - 1 else WHOLE_STEP << part)
-        if self._watched:
-            watch(self)
+        if start is not None:
+            watch(self, start, fresh)
 
     # Access
 
@@ -388,7 +392,7 @@ class World:
         return joints_of(self)
 
     def events(self, trigger: Trigger) -> Events:
-        """What a trigger of the scene saw in the last step, and how often things came and went.
+        """What a trigger of the scene saw in the last step, how often things came and went, and when they last came.
 
         Raises:
             KeyError: it is not in the scene.

@@ -168,6 +168,25 @@ def test_a_tree_finds_what_trying_all_finds(kind: str, monkeypatch: pytest.Monke
         np.testing.assert_array_equal(tree.place, brute.place)
 
 
+def test_a_tree_finds_what_touches_to_rounding(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Balls whose lowest places are a last bit above or below a box's upper side."""
+    rng = np.random.default_rng(4)
+    scene = sy.Scene(gravity=(0, 0, 0))
+    balls = []
+    for radius in rng.uniform(0.1, 0.5, 300).tolist():
+        x, z = rng.uniform(-30, 30, 2)
+        place = (x, np.nextafter(radius, rng.choice([0.0, 1.0])), z)
+        balls.append(scene.add(sy.Particle(position=place, mass=1.0, radius=radius)))
+    world = world_of(scene)
+    found = []
+    for many in (1, 10**9):
+        monkeypatch.setattr(ask.Queries, "many", many)
+        hits = world.queries.overlap(sy.Box((40, 1, 40)), (0, -1, 0))
+        found.append([bool(hits.of(ball).any()) for ball in balls])
+    assert found[0] == found[1]
+    assert 20 < sum(found[0]) < 280
+
+
 # Shapes
 
 

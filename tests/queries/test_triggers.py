@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import steelyard as sy
+from steelyard.scene.shapes import rotation_matrix
 
 
 def test_what_falls_through_enters_stays_and_leaves() -> None:
@@ -81,6 +82,65 @@ def test_a_carried_trigger_sees_what_an_overlap_at_its_place_does(shape: object)
     assert some > 20
 
 
+def tumble() -> tuple[sy.Scene, list[sy.Trigger]]:
+    """Things that fall, roll and come to rest; triggers that stand, are carried and lie just under the floor."""
+    rng = np.random.default_rng(5)
+    scene = sy.Scene()
+    scene.add(sy.Ground(friction=0.5))
+    scene.add(sy.Collisions(friction=0.5))
+    shapes = [sy.Box((0.2, 0.3, 0.15)), sy.Capsule(0.15, 0.3), sy.Sphere(0.25)]
+    for k in range(6):
+        scene.add(
+            sy.Body(
+                position=(1.0 * k - 2.5, 1.0, 0.3 * (-1) ** k),
+                velocity=tuple(rng.uniform(-1.5, 1.5, 3)),
+                angular_velocity=tuple(rng.uniform(-4, 4, 3)),
+                parts=shapes[k % 3],
+            )
+        )
+    cell = sy.Box((0.5, 0.5, 0.5))
+    floor = sy.Box((9, 1, 9))
+    triggers = [
+        *(scene.add(sy.Trigger(floor, place=(0, -1 - depth, 0))) for depth in (0, 1e-6, 1e-3)),
+        *(scene.add(sy.Trigger(cell, place=(x, 0.3, 0.2))) for x in (-2.0, -0.5, 1.0)),
+        scene.add(sy.Trigger(sy.Sphere(0.8), place=(0.1, 0, 0), body=scene.bodies[1])),
+        scene.add(sy.Trigger(sy.Capsule(0.4, 0.5), place=(0, 0.3, 0), body=scene.bodies[3])),
+    ]
+    return scene, triggers
+
+
+def test_of_what_is_slow_a_trigger_sees_what_it_did_by_ends_of_steps() -> None:
+    """Bit for bit what overlaps at the ends of the steps tell, until the first fall asleep."""
+    scene, triggers = tumble()
+    world = sy.World(scene, worlds=8)
+    world.bodies.velocity[:] *= np.linspace(-1, 1, 8)[:, None, None]
+    before = {id(t): np.zeros((8, len(t.watched(scene))), dtype=bool) for t in triggers}
+    entries = {key: 0 * value for key, value in before.items()}
+    exits = {key: 0 * value for key, value in before.items()}
+    for _ in range(360):
+        world.step()
+        for trigger in triggers:
+            things, key = trigger.watched(scene), id(trigger)
+            place, turn = np.array(trigger.place), np.array(trigger.orientation)
+            if trigger.body is not None:
+                k = scene.bodies.index(trigger.body)
+                turn = world.bodies.orientation[:, k, None]
+                place = world.bodies.position[:, k, None] + (rotation_matrix(turn) @ place)
+            hits = world.queries.overlap(trigger.shape, place, orientation=turn, only=things)
+            now = np.stack([hits.of(thing)[:, 0].any(axis=1) for thing in things], axis=1)
+            events, was = world.events(trigger), before[key]
+            np.testing.assert_array_equal(events.inside, now)
+            np.testing.assert_array_equal(events.entered, now & ~was)
+            np.testing.assert_array_equal(events.stayed, now & was)
+            np.testing.assert_array_equal(events.left, was & ~now)
+            entries[key], exits[key] = entries[key] + (now & ~was), exits[key] + (was & ~now)
+            np.testing.assert_array_equal(events.entries, entries[key])
+            np.testing.assert_array_equal(events.exits, exits[key])
+            before[key] = now
+    assert world.bodies.asleep.any()
+    assert sum(count.sum() for count in exits.values()) > 30
+
+
 def test_worlds_reset_and_snapshots_take_triggers_along() -> None:
     scene = sy.Scene()
     scene.add(sy.Particle(position=(0, 1, 0), mass=1.0, radius=0.1))
@@ -117,6 +177,8 @@ def test_bad_triggers_are_refused() -> None:
         sy.Trigger(sy.Sphere(1.0), body=3)
     with pytest.raises(TypeError, match="only has 3"):
         sy.Trigger(sy.Sphere(1.0), only=[3])
+    with pytest.raises(ValueError, match="without parts"):
+        sy.Trigger(sy.Sphere(1.0), only=[sy.Body(position=(0, 0, 0), mass=1.0, inertia=(1, 1, 1))])
     scene = sy.Scene()
     other = sy.Particle(position=(0, 0, 0), mass=1.0)
     with pytest.raises(ValueError, match="not in this scene"):
@@ -125,3 +187,13 @@ def test_bad_triggers_are_refused() -> None:
     world = sy.World(scene)
     with pytest.raises(KeyError, match="no Trigger"):
         world.events(sy.Trigger(sy.Sphere(1.0)))
+
+
+def test_a_body_without_parts_is_nothing_to_see() -> None:
+    scene = sy.Scene()
+    scene.add(sy.Body(position=(0, 0, 0), mass=1.0, inertia=(1, 1, 1)))
+    ball = scene.add(sy.Particle(position=(0, 0, 0), mass=1.0))
+    gate = scene.add(sy.Trigger(sy.Sphere(1.0)))
+    world = sy.World(scene)
+    world.step()
+    assert world.events(gate).things == (ball,) and world.events(gate).inside.all()

@@ -18,7 +18,7 @@ from ..scene.links import Cable, CableConstraint
 from ..scene.particle import Particle
 from ..scene.rider import Rider
 from ..scene.scene import CONTACTS, LINKS, Scene
-from ..scene.triggers import Trigger
+from ..scene.triggers import SEEN, Trigger
 from . import derived, tape
 from .bodies import Bodies
 from .compliances import add_compliances
@@ -223,8 +223,8 @@ class Compiler:
             self.rigid.state()
         for trigger in self.scene.of(Trigger):
             things = len(trigger.watched(self.scene))
-            for name in ("inside", "before", "entries", "exits"):
-                self.state((trigger, name), np.zeros(things))
+            for name, value in SEEN.items():
+                self.state((trigger, name), [value] * things)
         if self.method.solver is not None and not self.method.solver.staged:
             most = len(self.links) + len(self.contacts)
             header["moves"] = self.state((PARTICLES, "moves"), np.zeros(6 * most))

@@ -25,30 +25,35 @@ from ..kernel import inner, kernel
 from ..math.pointers import doubles_at
 from ..model.colliders import BOX, HALF_SPACE, PLACED, SIZE
 
-# Newton's steps, and the gap [m] that is none, over the sizes at hand.
-_STEPS, _TOUCHING = 100, 1e-14
-_FAR = 1e300
-# Where the axes of two boxes are parallel, products of edges part nothing that faces do not.
-_PARALLEL = 1e-12
+#: Newton's steps.
+STEPS = 100
+# The gap [m] that is none, over the sizes at hand.
+_TOUCHING = 1e-14
+FAR = 1e300
+#: Where the axes of two boxes are parallel, products of edges part nothing that faces do not.
+PARALLEL = 1e-12
 # Gap [m], over the box's size, within which the places where two boxes touch are looked for.
 _MANIFOLD = 1e-7
-_OUT = 2 * PLACED
-_WORK = _OUT + ALL_POINTS * POINT
+#: Two colliders lie in the memory, then the points at which they touch.
+OUT = 2 * PLACED
+_WORK = OUT + ALL_POINTS * POINT
 #: Numbers to work in.
 MEMORY = _WORK + WORK
 #: Colliders from which on a tree is made (below, planting it takes what it saves).
 MANY = 4
+# Boxes about what is placed are larger by this, over place and size, than rounding makes them smaller.
+_ROUNDING = 1e-15
 # Numbers of a hit: way, gap, normal, place.
 HIT = 8
 
 
 @inner
-def _nearest(m, kind_a, kind_b, margin):
+def nearest(m, kind_a, kind_b, margin):
     """Index of the point of least gap, or -1 without any."""
-    count = collide(m, kind_a, 0, kind_b, PLACED, _OUT, _WORK, margin)
+    count = collide(m, kind_a, 0, kind_b, PLACED, OUT, _WORK, margin)
     best = -1
     for i in range(count):
-        if best < 0 or m[_OUT + POINT * i + 3] < m[_OUT + POINT * best + 3]:
+        if best < 0 or m[OUT + POINT * i + 3] < m[OUT + POINT * best + 3]:
             best = i
     return best
 
@@ -56,7 +61,7 @@ def _nearest(m, kind_a, kind_b, margin):
 @inner
 def _write(m, hit, way, index):
     """A hit from a point."""
-    at = _OUT + POINT * index
+    at = OUT + POINT * index
     hit[0] = way
     hit[1] = m[at + 3]
     for k in range(3):
@@ -70,39 +75,49 @@ def _cast_convex(m, kind_a, kind_b, x, y, z, dx, dy, dz, reach, hit):
     size = m[SIZE] + m[SIZE + 1] + m[PLACED + SIZE] + m[PLACED + SIZE + 1] + m[PLACED + SIZE + 2]
     size += abs(x) + abs(y) + abs(z) + abs(m[PLACED]) + abs(m[PLACED + 1]) + abs(m[PLACED + 2])
     way = 0.0
-    for _ in range(_STEPS):
+    for _ in range(STEPS):
         m[0] = x + way * dx
         m[1] = y + way * dy
         m[2] = z + way * dz
-        index = _nearest(m, kind_a, kind_b, _FAR)
+        index = nearest(m, kind_a, kind_b, FAR)
         if index < 0:
-            return _FAR
-        at = _OUT + POINT * index
+            return FAR
+        at = OUT + POINT * index
         gap = m[at + 3]
         if gap <= _TOUCHING * size:
             _write(m, hit, way, index)
             return way
         slope = m[at] * dx + m[at + 1] * dy + m[at + 2] * dz
         if slope >= 0.0:
-            return _FAR
+            return FAR
         step = -gap / slope
         if way + step > reach:
-            return _FAR
+            return FAR
         if way + step == way:
             _write(m, hit, way, index)
             return way
         way += step
-    return _FAR
+    return FAR
 
 
 @inner
-def _extent(m, box, x, y, z):
+def extent(m, box, x, y, z):
     """Half the length of a box along an axis of any length."""
     total = 0.0
     for k in range(3):
         ax, ay, az = axis(m, box, k)
         total += m[box + SIZE + k] * abs(ax * x + ay * y + az * z)
     return total
+
+
+@inner
+def parting_axis(m, i):
+    """Of the fifteen axes across which faces and edges of two boxes can part them, one, of any length."""
+    if i < 6:
+        return axis(m, 0 if i < 3 else PLACED, i % 3)
+    ux, uy, uz = axis(m, 0, (i - 6) // 3)
+    vx, vy, vz = axis(m, PLACED, (i - 6) % 3)
+    return uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
 
 
 @inner
@@ -114,38 +129,31 @@ def _cast_boxes(m, x, y, z, dx, dy, dz, reach, hit):
     py = y - m[PLACED + 1]
     pz = z - m[PLACED + 2]
     for i in range(15):
-        if i < 6:
-            ax, ay, az = axis(m, 0 if i < 3 else PLACED, i % 3)
-        else:
-            ux, uy, uz = axis(m, 0, (i - 6) // 3)
-            vx, vy, vz = axis(m, PLACED, (i - 6) % 3)
-            ax = uy * vz - uz * vy
-            ay = uz * vx - ux * vz
-            az = ux * vy - uy * vx
-        if ax * ax + ay * ay + az * az > _PARALLEL:
+        ax, ay, az = parting_axis(m, i)
+        if ax * ax + ay * ay + az * az > PARALLEL:
             apart = ax * px + ay * py + az * pz
             speed = ax * dx + ay * dy + az * dz
-            half = _extent(m, 0, ax, ay, az) + _extent(m, PLACED, ax, ay, az)
+            half = extent(m, 0, ax, ay, az) + extent(m, PLACED, ax, ay, az)
             if speed == 0.0:
                 if abs(apart) > half:
-                    return _FAR
+                    return FAR
             else:
                 one = (-half - apart) / speed
                 two = (half - apart) / speed
                 first = max(first, min(one, two))
                 last = min(last, max(one, two))
     if first > last:
-        return _FAR
+        return FAR
     m[0] = x + first * dx
     m[1] = y + first * dy
     m[2] = z + first * dz
     margin = _MANIFOLD * (m[SIZE] + m[SIZE + 1] + m[SIZE + 2])
-    count = collide(m, BOX, 0, BOX, PLACED, _OUT, _WORK, margin if first > 0.0 else 0.0)
+    count = collide(m, BOX, 0, BOX, PLACED, OUT, _WORK, margin if first > 0.0 else 0.0)
     if count > 0:
         # The middle of the points that touch.
         best = 0
         for i in range(1, count):
-            if m[_OUT + POINT * i + 3] < m[_OUT + POINT * best + 3]:
+            if m[OUT + POINT * i + 3] < m[OUT + POINT * best + 3]:
                 best = i
         _write(m, hit, first, best)
         if first > 0.0:
@@ -153,7 +161,7 @@ def _cast_boxes(m, x, y, z, dx, dy, dz, reach, hit):
             for k in range(3):
                 total = 0.0
                 for i in range(count):
-                    total += m[_OUT + POINT * i + 4 + k]
+                    total += m[OUT + POINT * i + 4 + k]
                 hit[5 + k] = total / count
     else:
         # A corner's touch that rounding misses: between both centres.
@@ -177,6 +185,13 @@ def _cast_one(m, kind_a, kind_b, x, y, z, dx, dy, dz, reach, hit):
 
 
 @inner
+def _half_box(placed, kind, k):
+    """Half the length [m] along an axis of the world of a box that holds a placed collider, rounding or not."""
+    half = half_extent(placed, kind, 0, k)
+    return half + _ROUNDING * (abs(placed[k]) + half)
+
+
+@inner
 def plant(kinds, placed, allowed, n, s):
     """A tree of the allowed colliders of one world that have an end, in all of two arrays."""
     leaves = kinds.shape[0]
@@ -185,7 +200,7 @@ def plant(kinds, placed, allowed, n, s):
         if allowed[i] and kinds[i] != HALF_SPACE:
             own = box_of(0, i)
             for k in range(3):
-                half = half_extent(placed[i], kinds[i], 0, k)
+                half = _half_box(placed[i], kinds[i], k)
                 s[own + k] = placed[i, k] - half
                 s[own + 3 + k] = placed[i, k] + half
             insert_leaf(n, 0, s, 0, leaves, i)
@@ -203,13 +218,13 @@ def _enters(s, node, ray, half, limit):
         speed = ray[3 + k]
         if speed == 0.0:
             if low > 0.0 or high < 0.0:
-                return _FAR
+                return FAR
         else:
             one = low / speed
             two = high / speed
             first = max(first, min(one, two))
             last = min(last, max(one, two))
-    return first if first <= last else _FAR
+    return first if first <= last else FAR
 
 
 @kernel
@@ -245,7 +260,7 @@ def cast_many(
             for k in range(3):
                 ray[k] = query[w, c, k]
                 ray[3 + k] = direction[w, c, k]
-                half[k] = half_extent(query[w, c], kind, 0, k)
+                half[k] = _half_box(query[w, c], kind, k)
             for k in range(PLACED):
                 m[k] = query[w, c, k]
             best = reach[w, c]
@@ -323,7 +338,7 @@ def overlap_many(
             for k in range(PLACED):
                 m[k] = query[w, c, k]
             for k in range(3):
-                half = half_extent(query[w, c], kind, 0, k)
+                half = _half_box(query[w, c], kind, k)
                 boxes[box + k] = query[w, c, k] - half
                 boxes[box + 3 + k] = query[w, c, k] + half
             waiting = 0
@@ -351,7 +366,7 @@ def overlap_many(
                 if item >= 0:
                     for k in range(PLACED):
                         m[PLACED + k] = placed[w, item, k]
-                    index = _nearest(m, kind, kinds[item], 0.0)
+                    index = nearest(m, kind, kinds[item], 0.0)
                     if index >= 0:
                         found[w, c, item] = item
                         _write(m, hits[w, c, item], 0.0, index)

@@ -1,4 +1,4 @@
-"""Colliders of all worlds, placed: what queries and triggers look at."""
+"""Colliders of all worlds, placed: what queries look at."""
 
 from __future__ import annotations
 

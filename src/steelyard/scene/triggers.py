@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import nan
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from . import checks
@@ -15,18 +16,25 @@ if TYPE_CHECKING:
     from .scene import Scene
 
 
+#: What the state holds of everything that a trigger watches, in this order, and how it starts.
+SEEN = {
+    "inside": 0.0, "entered": 0.0, "left": 0.0, "entries": 0.0, "exits": 0.0, "entry_time": nan,
+}  # fmt: skip
+
+
 @dataclass(eq=False)
 class Trigger:
     """A volume that reports what enters it, stays in it and leaves it; it resolves no contact.
 
-    Looked at after every step: what passes through within one step is not seen. See ``World.events``.
+    Looked at after every step; what passes through within one step is seen on the straight way between the
+    step's start and its end. See ``World.events``.
 
     Args:
         shape: a Sphere, Box or Capsule.
         place: its centre [m], in the world, or in the frame of ``body``.
         orientation: quaternion (w, x, y, z) of any length but 0; given a body, in its frame.
         body: what carries it along, and is not seen by it; None for a volume that stands still.
-        only: particles and bodies that it looks for; by default all that can move.
+        only: particles and bodies that it looks for; by default all that can move and have a shape.
     """
 
     shape: Sphere | Box | Capsule
@@ -55,6 +63,10 @@ class Trigger:
                 raise TypeError(
                     f"Trigger: only has {thing!r}; it must hold a Particle or a Body each. Name what is to be seen."
                 )
+            if not _has_shape(thing):
+                raise ValueError(
+                    "Trigger: only has a Body without parts, of which nothing can be seen. Give it a shape."
+                )
 
     @property
     def particles(self) -> tuple[Any, ...]:
@@ -67,4 +79,13 @@ class Trigger:
         if self.only is not None:
             wanted = {id(thing) for thing in self.only}
             return [thing for thing in everything if id(thing) in wanted]
-        return [thing for thing in everything if thing.movable and thing is not self.body]
+        return [
+            thing
+            for thing in everything
+            if thing.movable and thing is not self.body and _has_shape(thing)
+        ]
+
+
+def _has_shape(thing: Particle | Body) -> bool:
+    """Whether there is something to see: a particle without a radius is a point."""
+    return isinstance(thing, Particle) or bool(thing.parts)
