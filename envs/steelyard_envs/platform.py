@@ -75,12 +75,15 @@ def _towards(speed, wanted, change):
 
 
 @sy.inner
-def _move(action, values, w, axis, dt, size):
-    """Speed up towards the commanded speed and move at constant acceleration; stop at the deck's edge."""
+def _move(action, values, w, axis, dt, share):
+    """Speed up towards the commanded speed and move at constant acceleration; stop at the deck's edge.
+
+    ``share`` is ``dt`` over the deck's size.
+    """
     wanted = SPEED[axis] * min(max(action, -1.0), 1.0) if action == action else 0.0
     old = values[_SPEED_X + axis, w]
     speed = _towards(old, wanted, ACCELERATION[axis] * dt)
-    place = values[_ALONG + axis, w] + 0.5 * (old + speed) * dt / size
+    place = values[_ALONG + axis, w] + 0.5 * (old + speed) * share
     if place < 0.0 or place > 1.0:
         place = min(max(place, 0.0), 1.0)
         speed = 0.0
@@ -92,110 +95,112 @@ def _move(action, values, w, axis, dt, size):
 def _control(actions, values, streams, settings, layout, state):
     """Move the load as commanded and push the deck when it is time."""
     dt = settings[_DT]
-    weights = layout[_WEIGHTS]
-    rates = layout[_RATES]
-    velocity = layout[_VELOCITY]
-    accelerations = layout[_ACCELERATIONS]
-    half = 0.5 * dt * dt
+    weights = state[layout[_WEIGHTS] :]
+    rates = state[layout[_RATES] :]
+    velocity = state[layout[_VELOCITY] :]
+    accelerations = state[layout[_ACCELERATIONS] :]
+    per_length, per_width = 1.0 / LENGTH, 1.0 / WIDTH
+    gain = 2.0 / (dt * dt)
     for w in range(actions.shape[0]):
         u0, v0 = values[_ALONG, w], values[_ACROSS, w]
-        du, dv = values[_SPEED_X, w] / LENGTH, values[_SPEED_Z, w] / WIDTH
-        _move(actions[w, 0], values, w, 0, dt, LENGTH)
-        _move(actions[w, 1], values, w, 1, dt, WIDTH)
+        du, dv = values[_SPEED_X, w] * per_length, values[_SPEED_Z, w] * per_width
+        _move(actions[w, 0], values, w, 0, dt, dt * per_length)
+        _move(actions[w, 1], values, w, 1, dt, dt * per_width)
         u1, v1 = values[_ALONG, w], values[_ACROSS, w]
         rate00 = -du * (1.0 - v0) - (1.0 - u0) * dv
         rate01 = -du * v0 + (1.0 - u0) * dv
         rate10 = du * (1.0 - v0) - u0 * dv
         rate11 = du * v0 + u0 * dv
-        state[rates, w] = rate00
-        state[rates + 1, w] = rate01
-        state[rates + 2, w] = rate10
-        state[rates + 3, w] = rate11
-        to00 = (1.0 - u1) * (1.0 - v1) - state[weights, w]
-        to01 = (1.0 - u1) * v1 - state[weights + 1, w]
-        to10 = u1 * (1.0 - v1) - state[weights + 2, w]
-        to11 = u1 * v1 - state[weights + 3, w]
-        state[accelerations, w] = (to00 - rate00 * dt) / half
-        state[accelerations + 1, w] = (to01 - rate01 * dt) / half
-        state[accelerations + 2, w] = (to10 - rate10 * dt) / half
-        state[accelerations + 3, w] = (to11 - rate11 * dt) / half
+        rates[0, w] = rate00
+        rates[1, w] = rate01
+        rates[2, w] = rate10
+        rates[3, w] = rate11
+        to00 = (1.0 - u1) * (1.0 - v1) - weights[0, w]
+        to01 = (1.0 - u1) * v1 - weights[1, w]
+        to10 = u1 * (1.0 - v1) - weights[2, w]
+        to11 = u1 * v1 - weights[3, w]
+        accelerations[0, w] = (to00 - rate00 * dt) * gain
+        accelerations[1, w] = (to01 - rate01 * dt) * gain
+        accelerations[2, w] = (to10 - rate10 * dt) * gain
+        accelerations[3, w] = (to11 - rate11 * dt) * gain
         if values[_ELAPSED, w] >= values[_NEXT_PUSH, w]:
             pause = settings[_PUSH_PAUSE]
             values[_NEXT_PUSH, w] += math.ceil(pause * sy.uniform_between(streams, w, 0.5, 1.5))
             angle = 2.0 * math.pi * sy.uniform(streams, w)
             kick = settings[_PUSH] * sy.uniform(streams, w) / (LOAD + DECK_MASS)
             for p in range(2, 7):
-                state[velocity + 3 * p, w] += kick * math.cos(angle)
-                state[velocity + 3 * p + 2, w] += kick * math.sin(angle)
+                velocity[3 * p, w] += kick * math.cos(angle)
+                velocity[3 * p + 2, w] += kick * math.sin(angle)
 
 
 @sy.kernel
 def _observe(mask, values, layout, state, observations):
     """Observations of the worlds of ``mask``."""
-    position = layout[_POSITION]
-    velocity = layout[_VELOCITY]
+    feet = state[layout[_POSITION] :]
+    # Corners are left back, left front, right back, right front.
+    x = feet[6:]
+    v = state[layout[_VELOCITY] + 6 :]
+    along, across = 0.5 / LENGTH, 0.5 / WIDTH
     for w in range(mask.shape[0]):
         if not mask[w]:
             continue
-        x = position + 6
-        v = velocity + 6
-        # Corners are left back, left front, right back, right front.
-        left = state[x + 1, w] + state[x + 4, w]
-        right = state[x + 7, w] + state[x + 10, w]
-        back = state[x + 1, w] + state[x + 7, w]
-        front = state[x + 4, w] + state[x + 10, w]
-        rise = state[v + 7, w] + state[v + 10, w] - state[v + 1, w] - state[v + 4, w]
-        lean = state[v + 4, w] + state[v + 10, w] - state[v + 1, w] - state[v + 7, w]
-        turn = state[x + 8, w] + state[x + 11, w] - state[x + 2, w] - state[x + 5, w]
+        left = x[1, w] + x[4, w]
+        right = x[7, w] + x[10, w]
+        back = x[1, w] + x[7, w]
+        front = x[4, w] + x[10, w]
+        rise = v[7, w] + v[10, w] - v[1, w] - v[4, w]
+        lean = v[4, w] + v[10, w] - v[1, w] - v[7, w]
+        turn = x[8, w] + x[11, w] - x[2, w] - x[5, w]
         observations[w, 0] = LEFT + LENGTH * values[_ALONG, w]
         observations[w, 1] = WIDTH * (values[_ACROSS, w] - 0.5)
         observations[w, 2] = values[_SPEED_X, w]
         observations[w, 3] = values[_SPEED_Z, w]
-        observations[w, 4] = clip((right - left) / (2.0 * LENGTH), -1.0, 1.0)
-        observations[w, 5] = clip((front - back) / (2.0 * WIDTH), -1.0, 1.0)
-        observations[w, 6] = clip(rise / (2.0 * LENGTH), -10.0, 10.0)
-        observations[w, 7] = clip(lean / (2.0 * WIDTH), -10.0, 10.0)
-        observations[w, 8] = clip(turn / (2.0 * LENGTH), -1.0, 1.0)
-        for foot in range(2):
-            observations[w, 9 + foot] = clip(state[position + 3 * foot + 1, w], -1.0, 5.0)
-        for axis in range(2):
-            a = state[position + 2 * axis, w]
-            b = state[position + 3 + 2 * axis, w]
-            observations[w, 11 + axis] = clip(0.5 * (a + b), -5.0, 5.0)
+        observations[w, 4] = clip((right - left) * along, -1.0, 1.0)
+        observations[w, 5] = clip((front - back) * across, -1.0, 1.0)
+        observations[w, 6] = clip(rise * along, -10.0, 10.0)
+        observations[w, 7] = clip(lean * across, -10.0, 10.0)
+        observations[w, 8] = clip(turn * along, -1.0, 1.0)
+        observations[w, 9] = clip(feet[1, w], -1.0, 5.0)
+        observations[w, 10] = clip(feet[4, w], -1.0, 5.0)
+        observations[w, 11] = clip(0.5 * (feet[0, w] + feet[3, w]), -5.0, 5.0)
+        observations[w, 12] = clip(0.5 * (feet[2, w] + feet[5, w]), -5.0, 5.0)
 
 
 @sy.inner
-def _off_balance(state, layout, w):
+def _off_balance(x, v, w):
     """How far the extrapolated centre of mass of deck and load is from over the feet along x [m].
 
     The centre of mass x and its speed v, as x + v / w with w the rate at which the platform topples: what falls
     and what does not, whatever the deck's slope (Hof, Gazendam & Sinke 2005).
     """
-    position = layout[_POSITION]
-    velocity = layout[_VELOCITY]
-    corner = DECK_MASS / 4.0
-    x = LOAD * (state[position + 18, w] + TOPPLING_TIME * state[velocity + 18, w])
-    for k in range(2, 6):
-        x += corner * (state[position + 3 * k, w] + TOPPLING_TIME * state[velocity + 3 * k, w])
-    return x / (LOAD + DECK_MASS) - 0.5 * (state[position, w] + state[position + 3, w])
+    load = LOAD / (LOAD + DECK_MASS)
+    corner = 0.25 * DECK_MASS / (LOAD + DECK_MASS)
+    place = x[6, w] + x[9, w] + x[12, w] + x[15, w]
+    speed = v[6, w] + v[9, w] + v[12, w] + v[15, w]
+    away = corner * (place + TOPPLING_TIME * speed) + load * (x[18, w] + TOPPLING_TIME * v[18, w])
+    return away - 0.5 * (x[0, w] + x[3, w])
 
 
 @sy.inner
 def _judge(actions, values, settings, layout, state, observations, rewards, flags):
     """Rewards and flags after a step; the number of episodes that ended."""
+    x = state[layout[_POSITION] :]
+    v = state[layout[_VELOCITY] :]
+    nonfinite = state[layout[_NONFINITE] :]
+    per_speed = 0.1 / (SPEED[0] * SPEED[0])
     ended = 0
     for w in range(actions.shape[0]):
         values[_ELAPSED, w] += 1.0
-        broken = state[layout[_NONFINITE], w] > 0.0
+        broken = nonfinite[0, w] > 0.0
         pitch = np.float64(observations[w, 4])
         roll = np.float64(observations[w, 5])
         fallen = broken or abs(pitch) > FALLEN or abs(roll) > FALLEN
-        square = (pitch * pitch + roll * roll) / 0.01
+        square = 100.0 * (pitch * pitch + roll * roll)
         speed = values[_SPEED_X, w] ** 2 + values[_SPEED_Z, w] ** 2
         level = 0.0 if broken else 0.5 / (1.0 + square)
-        offset = _off_balance(state, layout, w) / 0.1
+        offset = 10.0 * _off_balance(x, v, w)
         balance = 0.0 if broken else 0.5 / (1.0 + offset * offset)
-        effort = -0.1 * speed / (SPEED[0] * SPEED[0])
+        effort = -per_speed * speed
         fall = -10.0 if fallen else 0.0
         rewards[1, w] = level
         rewards[2, w] = balance

@@ -10,10 +10,24 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
+import steelyard as sy
 from steelyard_envs.single import check_render_mode, make_renderer, step_error, warn_of_no_mode
 from steelyard_envs.task import PHYSICS_ERROR, SUCCESS, TERMINATED, TRUNCATED, Task
 
 Array = NDArray[Any]
+
+
+@sy.kernel
+def _forget(mask, kept, streams, rewards, flags):
+    """Drop what the worlds of a mask did in a step: rewards, flags, and the random numbers drawn since ``kept``."""
+    for w in range(mask.shape[0]):
+        if mask[w]:
+            for row in range(streams.shape[0]):
+                streams[row, w] = kept[row, w]
+            for row in range(rewards.shape[0]):
+                rewards[row, w] = 0.0
+            for row in range(flags.shape[0]):
+                flags[row, w] = False
 
 
 class TaskVectorEnv(gym.vector.VectorEnv[Array, Array, Array]):
@@ -140,13 +154,9 @@ class TaskVectorEnv(gym.vector.VectorEnv[Array, Array, Array]):
         given[:] = actions
         again = self._done if self.autoreset_mode == AutoresetMode.NEXT_STEP else None
         if again is not None and again.any():
-            rows = np.flatnonzero(again)
-            streams = task.streams[:, rows]
+            streams = task.streams.copy()
             task.step(given)
-            # What a finished row did in this step is dropped, the random numbers it drew included.
-            task.streams[:, rows] = streams
-            task.rewards[:, rows] = 0.0
-            task.flags[:, rows] = False
+            _forget(again, streams, task.streams, task.rewards, task.flags)
             task.start(again)
             ended = 1
         else:
@@ -164,7 +174,7 @@ class TaskVectorEnv(gym.vector.VectorEnv[Array, Array, Array]):
                 task.start(done)
         if self.render_mode == "human":
             self.render()
-        info = self._info(self._all) | info
+        info = self._info() | info
         return task.observations.copy(), reward, terminated, truncated, info
 
     def _final(self, done: Array) -> dict[str, Any]:
@@ -179,11 +189,16 @@ class TaskVectorEnv(gym.vector.VectorEnv[Array, Array, Array]):
             "_final_info": done.copy(),
         }
 
-    def _info(self, rows: Array) -> dict[str, Any]:
-        """Reward terms and flags of ``rows`` (num_envs,) bool, in Gymnasium's form; others are 0."""
+    def _info(self, rows: Array | None = None) -> dict[str, Any]:
+        """Reward terms and flags of all rows, or of ``rows`` (num_envs,) bool, in Gymnasium's form; others are 0."""
         task = self.task
-        terms = task.rewards[1:] * rows
-        flags = task.flags & rows
+        terms = task.rewards[1:].copy()
+        flags = task.flags.copy()
+        if rows is None:
+            rows = self._all
+        else:
+            terms *= rows
+            flags &= rows
         info: dict[str, Any] = dict(zip(self._names, terms, strict=True))
         info["is_success"] = flags[SUCCESS]
         info["physics_error"] = flags[PHYSICS_ERROR]

@@ -118,6 +118,20 @@ def symmetric_inverse(s, row, out):
 
 
 @inner
+def inverse(ax, ay, az, bx, by, bz, cx, cy, cz):
+    """Rows of the inverse of a matrix with the columns a, b, c; zeros if there is none."""
+    px, py, pz = cross(bx, by, bz, cx, cy, cz)
+    qx, qy, qz = cross(cx, cy, cz, ax, ay, az)
+    rx, ry, rz = cross(ax, ay, az, bx, by, bz)
+    share = _reciprocal(dot(ax, ay, az, px, py, pz))
+    return (
+        share * px, share * py, share * pz,
+        share * qx, share * qy, share * qz,
+        share * rx, share * ry, share * rz,
+    )  # fmt: skip
+
+
+@inner
 def solve(ax, ay, az, bx, by, bz, cx, cy, cz, x, y, z):
     """Solution of a 3 x 3 system with the columns a, b, c by its adjugate."""
     px, py, pz = cross(bx, by, bz, cx, cy, cz)

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from ..kernel import inner
 from ..math.lanes import absolute, any_lane, fma, load, select, splat, sqrt, store
+from ..math.vectors import dot, inverse, load_vector
 from ..model.tape import CONTACT, H_CONTACT_PRODUCTS, H_CONTACTS, H_DENSE, H_GUESS, H_RIGHT
 from .cone_rows import put_motion_rows, relative_motion
 
@@ -53,8 +54,11 @@ def _scales(s, w, soft):
 
 
 @inner
-def _contact_system(tape, s, skip, contact, k, velocity, first, width, softness):
-    """Three rows of the system for one contact; its error, the size of its impulse, the motion that the error makes."""
+def _contact_system(tape, s, skip, contact, k, velocity, first, width, softness, full):
+    """Three rows of the system for one contact; its error, the size of its impulse, the motion that the error makes.
+
+    A contact that is coupled to fewer than ``full`` others leaves gaps in its rows.
+    """
     zero = splat(0.0)
     one = splat(1.0)
     half = splat(0.5)
@@ -62,8 +66,9 @@ def _contact_system(tape, s, skip, contact, k, velocity, first, width, softness)
     guess = tape[H_GUESS] + slot
     row = tape[H_DENSE] + (slot - first) * width
     last = width - 1
-    for entry in range(3 * width):
-        store(s, row + entry, zero)
+    if tape[k + 4] < full:
+        for entry in range(3 * width):
+            store(s, row + entry, zero)
     un, ut, uu = softened_motion(tape, s, skip, contact, k, softness)
     n = load(s, guess)
     t = load(s, guess + 1)
@@ -87,10 +92,10 @@ def _contact_system(tape, s, skip, contact, k, velocity, first, width, softness)
     friction = load(s, tape[contact + 14])
     bound = friction * select(n > zero, n, zero)
     slides = (length > bound) & (closed > half)
-    safe = select(length > zero, length, one)
-    et = pt / safe
-    eu = pu / safe
-    share = select(slides, bound / safe, closed)
+    shorter = one / select(length > zero, length, one)
+    et = pt * shorter
+    eu = pu * shorter
+    share = select(slides, bound * shorter, closed)
     p00 = select(slides, one - et * et, one)
     p01 = select(slides, zero - et * eu, zero)
     p11 = select(slides, one - eu * eu, one)
@@ -122,30 +127,44 @@ def _contact_system(tape, s, skip, contact, k, velocity, first, width, softness)
 
 
 @inner
-def _eliminate(s, dense, size):
-    """Solve the dense system in place, last column the right side."""
+def _eliminate(s, dense, count):
+    """Solve the dense system in place by blocks of three, last column the right side."""
     zero = splat(0.0)
-    one = splat(1.0)
+    size = 3 * count
     width = size + 1
-    for k in range(size):
-        row = dense + k * width
-        pivot = load(s, row + k)
-        good = absolute(pivot) > zero
-        inverse = select(good, one / select(good, pivot, one), zero)
-        for column in range(k + 1, width):
-            store(s, row + column, load(s, row + column) * inverse)
-        for below in range(k + 1, size):
-            at = dense + below * width
-            factor = zero - load(s, at + k)
-            for column in range(k + 1, width):
-                value = fma(factor, load(s, row + column), load(s, at + column))
-                store(s, at + column, value)
-    for k in range(size - 1, -1, -1):
-        row = dense + k * width
-        value = load(s, row + size)
-        for column in range(k + 1, size):
-            value = fma(zero - load(s, row + column), load(s, dense + column * width + size), value)
-        store(s, row + size, value)
+    for k in range(count):
+        row = dense + 3 * k * width
+        own = row + 3 * k
+        ax, bx, cx = load_vector(s, own)
+        ay, by, cy = load_vector(s, own + width)
+        az, bz, cz = load_vector(s, own + 2 * width)
+        px, py, pz, qx, qy, qz, rx, ry, rz = inverse(ax, ay, az, bx, by, bz, cx, cy, cz)
+        for column in range(3 * k + 3, width):
+            at = row + column
+            x = load(s, at)
+            y = load(s, at + width)
+            z = load(s, at + 2 * width)
+            u = dot(px, py, pz, x, y, z)
+            v = dot(qx, qy, qz, x, y, z)
+            w = dot(rx, ry, rz, x, y, z)
+            store(s, at, u)
+            store(s, at + width, v)
+            store(s, at + 2 * width, w)
+            u = zero - u
+            v = zero - v
+            w = zero - w
+            for below in range(3 * k + 3, size):
+                x, y, z = load_vector(s, dense + below * width + 3 * k)
+                at = dense + below * width + column
+                store(s, at, fma(z, w, fma(y, v, fma(x, u, load(s, at)))))
+    for k in range(count - 1, 0, -1):
+        u = zero - load(s, dense + 3 * k * width + size)
+        v = zero - load(s, dense + (3 * k + 1) * width + size)
+        w = zero - load(s, dense + (3 * k + 2) * width + size)
+        for above in range(3 * k):
+            x, y, z = load_vector(s, dense + above * width + 3 * k)
+            at = dense + above * width + size
+            store(s, at, fma(z, w, fma(y, v, fma(x, u, load(s, at)))))
 
 
 @inner
@@ -161,6 +180,10 @@ def newton(tape, s, skip, velocity, worlds, allowed, softness):
     first = tape[at + 1 + 19]
     size = 3 * count
     width = size + 1
+    # Rows are full where each contact is coupled to all others; a block left out makes gaps.
+    full = count - 1
+    for index in range(count):
+        full += skip[tape[at + 1 + CONTACT * index + 20]]
     moving = worlds
     for turn in range(_ITERATIONS + 1):
         error = zero
@@ -171,7 +194,7 @@ def newton(tape, s, skip, velocity, worlds, allowed, softness):
             contact = at + 1 + CONTACT * index
             if skip[tape[contact + 20]] == 0:
                 wrong, extent, moved = _contact_system(
-                    tape, s, skip, contact, k, velocity, first, width, softness
+                    tape, s, skip, contact, k, velocity, first, width, softness, full
                 )
                 error = error + wrong
                 most = select(moved > most, moved, most)
@@ -186,7 +209,7 @@ def newton(tape, s, skip, velocity, worlds, allowed, softness):
         moving = moving & (error > splat(_SETTLED) * largest) & (most > splat(_SHARE) * allowed)
         if turn == _ITERATIONS or not any_lane(moving):
             break
-        _eliminate(s, tape[H_DENSE], size)
+        _eliminate(s, tape[H_DENSE], count)
         for index in range(count):
             contact = at + 1 + CONTACT * index
             if skip[tape[contact + 20]] == 0:
