@@ -26,6 +26,9 @@ TOPPLING_TIME = 0.62
 # Of rods and contacts, times the step squared: a fifteenth of the step's own error or less.
 _TOLERANCE = 0.025
 
+# Worlds that are worth code of their own.
+_MANY = 256
+
 # Rows of ``values``.
 _ALONG, _ACROSS, _SPEED_X, _SPEED_Z, _ELAPSED, _NEXT_PUSH = range(6)
 # Entries of ``settings`` and ``layout``.
@@ -278,7 +281,8 @@ class PlatformTask(Task):
         scene = sy.scenes.platform(load=LOAD)
         self._rider = scene.of(sy.Rider)[0]
         self._everyone = np.ones(self.num_envs, dtype=np.bool_)
-        return sy.World(scene, worlds=self.num_envs, method=method)
+        special = self.num_envs >= _MANY
+        return sy.World(scene, worlds=self.num_envs, method=method, special=special)
 
     def level_settings(self) -> tuple[float, ...]:
         """Start tilt [rad], impulse of a push [N s], mean pause between pushes [control steps]."""
