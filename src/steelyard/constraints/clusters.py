@@ -301,6 +301,18 @@ def start_clusters(tape, s, velocity):
 
 
 @inner
+def clear_touched(tape, s):
+    """No impulses on touched particles; those of the others are not read before a stage ends."""
+    zero = splat(0.0)
+    at = tape[H_CLUSTERS] + 1
+    for _ in range(tape[tape[H_CLUSTERS]]):
+        for k in range(tape[at + 2]):
+            p = tape[at + CLUSTER_HEAD + ENTRY * k]
+            store_vector(s, tape[H_IMPULSE] + p, zero, zero, zero)
+        at = cluster_end(tape, at)
+
+
+@inner
 def _pushed(tape, s, at):
     """Mean motion and moment with the impulses on touched particles."""
     work = tape[at + 7]

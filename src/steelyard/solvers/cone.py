@@ -29,7 +29,7 @@ from ..model.tape import (
     H_TOTAL,
 )
 from . import block_ldl
-from .cone_newton import newton, softened_motion
+from .cone_newton import anchor, newton, softened_motion
 from .cone_rows import relative_motion
 
 _SWEEPS = 200
@@ -223,18 +223,6 @@ def _put_back(tape, s, skip, velocity, worlds):
 
 
 @inner
-def _anchor(tape, s, skip):
-    """Softness pulls towards the impulses of the guess."""
-    at = tape[H_CONTACTS]
-    for index in range(tape[at]):
-        contact = at + 1 + CONTACT * index
-        if skip[tape[contact + 20]] == 0:
-            for axis in range(3):
-                value = load(s, tape[H_GUESS] + tape[contact + 19] + axis)
-                store(s, tape[contact + 23] + 3 + axis, value)
-
-
-@inner
 def _pull(tape, s, skip, softness):
     """Largest motion that softness leaves: compliance times the change of an impulse since the anchor."""
     pull = splat(0.0)
@@ -288,7 +276,7 @@ def solve_contacts(tape, s, skip, velocity, allowed, softness, first, hasty):
     elif any_lane(bad):
         _put_back(tape, s, skip, velocity, bad)
         for _ in range(_ANCHORS):
-            _anchor(tape, s, skip)
+            anchor(tape, s, skip, bad)
             failed = bad
             if tape[H_DENSE] >= 0:
                 failed = newton(tape, s, skip, velocity, bad, allowed, softness)
