@@ -26,6 +26,9 @@ TOPPLING_TIME = 0.62
 # Of rods and contacts, times the step squared: a fifteenth of the step's own error or less.
 _TOLERANCE = 0.025
 
+# Worlds that are worth code of their own.
+_MANY = 256
+
 # Rows of ``values``.
 _ALONG, _ACROSS, _SPEED_X, _SPEED_Z, _ELAPSED, _NEXT_PUSH = range(6)
 # Entries of ``settings`` and ``layout``.
@@ -133,37 +136,41 @@ def _control(actions, values, streams, settings, layout, state):
                 velocity[3 * p + 2, w] += kick * math.sin(angle)
 
 
+@sy.inner
+def _observe_world(w, x, v, values, observations):
+    """Observation of a world; ``x`` and ``v`` are rows of positions and velocities from the first on."""
+    # Corners are left back, left front, right back, right front.
+    left = x[7, w] + x[10, w]
+    right = x[13, w] + x[16, w]
+    back = x[7, w] + x[13, w]
+    front = x[10, w] + x[16, w]
+    rise = v[13, w] + v[16, w] - v[7, w] - v[10, w]
+    lean = v[10, w] + v[16, w] - v[7, w] - v[13, w]
+    turn = x[14, w] + x[17, w] - x[8, w] - x[11, w]
+    along, across = 0.5 / LENGTH, 0.5 / WIDTH
+    observations[w, 0] = LEFT + LENGTH * values[_ALONG, w]
+    observations[w, 1] = WIDTH * (values[_ACROSS, w] - 0.5)
+    observations[w, 2] = values[_SPEED_X, w]
+    observations[w, 3] = values[_SPEED_Z, w]
+    observations[w, 4] = clip((right - left) * along, -1.0, 1.0)
+    observations[w, 5] = clip((front - back) * across, -1.0, 1.0)
+    observations[w, 6] = clip(rise * along, -10.0, 10.0)
+    observations[w, 7] = clip(lean * across, -10.0, 10.0)
+    observations[w, 8] = clip(turn * along, -1.0, 1.0)
+    observations[w, 9] = clip(x[1, w], -1.0, 5.0)
+    observations[w, 10] = clip(x[4, w], -1.0, 5.0)
+    observations[w, 11] = clip(0.5 * (x[0, w] + x[3, w]), -5.0, 5.0)
+    observations[w, 12] = clip(0.5 * (x[2, w] + x[5, w]), -5.0, 5.0)
+
+
 @sy.kernel
 def _observe(mask, values, layout, state, observations):
     """Observations of the worlds of ``mask``."""
-    feet = state[layout[_POSITION] :]
-    # Corners are left back, left front, right back, right front.
-    x = feet[6:]
-    v = state[layout[_VELOCITY] + 6 :]
-    along, across = 0.5 / LENGTH, 0.5 / WIDTH
+    x = state[layout[_POSITION] :]
+    v = state[layout[_VELOCITY] :]
     for w in range(mask.shape[0]):
-        if not mask[w]:
-            continue
-        left = x[1, w] + x[4, w]
-        right = x[7, w] + x[10, w]
-        back = x[1, w] + x[7, w]
-        front = x[4, w] + x[10, w]
-        rise = v[7, w] + v[10, w] - v[1, w] - v[4, w]
-        lean = v[4, w] + v[10, w] - v[1, w] - v[7, w]
-        turn = x[8, w] + x[11, w] - x[2, w] - x[5, w]
-        observations[w, 0] = LEFT + LENGTH * values[_ALONG, w]
-        observations[w, 1] = WIDTH * (values[_ACROSS, w] - 0.5)
-        observations[w, 2] = values[_SPEED_X, w]
-        observations[w, 3] = values[_SPEED_Z, w]
-        observations[w, 4] = clip((right - left) * along, -1.0, 1.0)
-        observations[w, 5] = clip((front - back) * across, -1.0, 1.0)
-        observations[w, 6] = clip(rise * along, -10.0, 10.0)
-        observations[w, 7] = clip(lean * across, -10.0, 10.0)
-        observations[w, 8] = clip(turn * along, -1.0, 1.0)
-        observations[w, 9] = clip(feet[1, w], -1.0, 5.0)
-        observations[w, 10] = clip(feet[4, w], -1.0, 5.0)
-        observations[w, 11] = clip(0.5 * (feet[0, w] + feet[3, w]), -5.0, 5.0)
-        observations[w, 12] = clip(0.5 * (feet[2, w] + feet[5, w]), -5.0, 5.0)
+        if mask[w]:
+            _observe_world(w, x, v, values, observations)
 
 
 @sy.inner
@@ -183,13 +190,14 @@ def _off_balance(x, v, w):
 
 @sy.inner
 def _judge(actions, values, settings, layout, state, observations, rewards, flags):
-    """Rewards and flags after a step; the number of episodes that ended."""
+    """Observations, rewards and flags after a step; the number of episodes that ended."""
     x = state[layout[_POSITION] :]
     v = state[layout[_VELOCITY] :]
     nonfinite = state[layout[_NONFINITE] :]
     per_speed = 0.1 / (SPEED[0] * SPEED[0])
     ended = 0
     for w in range(actions.shape[0]):
+        _observe_world(w, x, v, values, observations)
         values[_ELAPSED, w] += 1.0
         broken = nonfinite[0, w] > 0.0
         pitch = np.float64(observations[w, 4])
@@ -220,13 +228,12 @@ def _judge(actions, values, settings, layout, state, observations, rewards, flag
 
 @sy.kernel
 def _step(
-    actions, everyone, values, streams, settings, layout, observations, rewards, flags,
+    actions, values, streams, settings, layout, observations, rewards, flags,
     state, launch, substeps,
 ):  # fmt: skip
     """A control step of all worlds: control, physics, observation, reward."""
     _control(actions, values, streams, settings, layout, state)
     sy.advance(launch, substeps)
-    _observe(everyone, values, layout, state, observations)
     return _judge(actions, values, settings, layout, state, observations, rewards, flags)
 
 
@@ -277,8 +284,8 @@ class PlatformTask(Task):
         method = sy.Method(integrator, solver, dt=1.0 / self.physics_rate)
         scene = sy.scenes.platform(load=LOAD)
         self._rider = scene.of(sy.Rider)[0]
-        self._everyone = np.ones(self.num_envs, dtype=np.bool_)
-        return sy.World(scene, worlds=self.num_envs, method=method)
+        special = self.num_envs >= _MANY
+        return sy.World(scene, worlds=self.num_envs, method=method, special=special)
 
     def level_settings(self) -> tuple[float, ...]:
         """Start tilt [rad], impulse of a push [N s], mean pause between pushes [control steps]."""
@@ -306,7 +313,7 @@ class PlatformTask(Task):
     def step(self, actions: Array) -> int:
         """One control step of all worlds."""
         ended: int = _step(
-            actions, self._everyone, self.values, self.streams, self.settings, self.layout,
+            actions, self.values, self.streams, self.settings, self.layout,
             self.observations, self.rewards, self.flags, self.world.state, self.world.launch, self.substeps,
         )  # fmt: skip
         return ended

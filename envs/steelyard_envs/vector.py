@@ -202,7 +202,8 @@ class TaskVectorEnv(gym.vector.VectorEnv[Array, Array, Array]):
         info: dict[str, Any] = dict(zip(self._names, terms, strict=True))
         info["is_success"] = flags[SUCCESS]
         info["physics_error"] = flags[PHYSICS_ERROR]
-        present = np.repeat(rows[None], len(info), axis=0)
+        present = np.empty((len(info), self.num_envs), dtype=np.bool_)
+        present[:] = rows
         return info | {f"_{name}": row for name, row in zip(info, present, strict=True)}
 
     def snapshot(self) -> tuple[Any, ...]:

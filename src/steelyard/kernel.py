@@ -25,6 +25,9 @@ from numba.core.compiler_machinery import PassManager
 
 _PACKAGE = Path(__file__).resolve().parent
 
+#: Rounds of LLVM's optimisation of code that is unfolded.
+_ROUNDS = 2
+
 #: Divisions follow IEEE (no exception on zero); no fast-math.
 OPTIONS: Any = {"nogil": True, "error_model": "numpy"}
 
@@ -104,6 +107,30 @@ class KernelCompiler(Compiler):
         """Compile a function and what it calls."""
         with _collector_paused():
             return super().compile_extra(func)
+
+
+class _Unfolded(JITCodeLibrary):
+    """Code into which all that it calls is inlined, so that what is constant in it is constant throughout."""
+
+    def _optimize_final_module(self) -> None:
+        for function in self._final_module.functions:
+            if not function.is_declaration and function.linkage.name in (
+                "linkonce_odr",
+                "internal",
+            ):
+                function.add_function_attribute("alwaysinline")
+        # What one round settles lets the next unroll more loops.
+        for _ in range(_ROUNDS):
+            super()._optimize_final_module()
+
+
+class UnfoldingCompiler(KernelCompiler):
+    """Numba's compiler for one function with all that it calls."""
+
+    def __init__(self, typing: Any, target: Any, library: Any, *rest: Any) -> None:
+        unfolded = _Unfolded(target.codegen(), "unfolded")
+        unfolded.enable_object_caching()
+        super().__init__(typing, target, library or unfolded, *rest)
 
 
 class _IngredientCompiler(KernelCompiler):

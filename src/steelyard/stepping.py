@@ -165,13 +165,15 @@ def _store_block(tape, s, state, width, picked, count, whole, loaded):
 def _flag_nonfinite(tape, s):
     """Set the flag of worlds whose positions or velocities are not finite."""
     zero = splat(0.0)
-    sum_ = zero
+    # Two sums, neither of which waits for the other.
+    place = zero
+    speed = zero
     for p in range(tape[H_PARTICLES]):
         for axis in range(axes(s)):
-            sum_ = fma(load(s, tape[H_POSITION] + 3 * p + axis), zero, sum_)
-            sum_ = fma(load(s, tape[H_VELOCITY] + 3 * p + axis), zero, sum_)
+            place = fma(load(s, tape[H_POSITION] + 3 * p + axis), zero, place)
+            speed = fma(load(s, tape[H_VELOCITY] + 3 * p + axis), zero, speed)
     flag = tape[H_NONFINITE]
-    store(s, flag, select(sum_ <= zero, load(s, flag), splat(1.0)))
+    store(s, flag, select(place + speed <= zero, load(s, flag), splat(1.0)))
 
 
 @inner

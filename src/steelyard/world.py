@@ -17,7 +17,7 @@ from .diagnostics.penetration import penetration_of
 from .diagnostics.residual import link_residuals
 from .math.pointers import LANES
 from .methods import Method, default_for
-from .model.compile import Model, compile_model
+from .model.compile import Model, compile_model, specialise
 from .model.parameters import BODIES, PARTICLES, Key
 from .model.tape import H_BODIES_DAMPED, H_DAMPED
 from .queries.ask import Queries
@@ -55,6 +55,8 @@ class World:
         tolerance: instead of a method: the cheapest that holds this error, see ``choose_method``.
         horizon: over which time [s] it must hold.
         threads: worlds are shared among so many threads; results do not depend on it.
+        special: compile the method's stages for this scene alone: the same results, to the bit, in up to a third less
+            time, for seconds of compiling when the scene is first stepped (kept on disk).
 
     Raises:
         TypeError: no scene or no method.
@@ -65,8 +67,8 @@ class World:
 
     # Slots, so that a misspelt assignment is an error and not a new attribute.
     __slots__ = (
-        "_choice", "_given", "_given_rows", "_launch", "_method", "_model", "_scene", "_scratch", "_split", "_stale",
-        "_state", "_threads", "_watched", "_worlds",
+        "_choice", "_given", "_given_rows", "_launch", "_method", "_model", "_scene", "_scratch", "_special", "_split",
+        "_stale", "_state", "_threads", "_watched", "_worlds",
     )  # fmt: skip
     _model: Model
     _state: np.ndarray
@@ -80,6 +82,7 @@ class World:
         tolerance: float | None = None,
         horizon: float = 1.0,
         threads: int = 1,
+        special: bool = False,
     ) -> None:
         checks.instance("World", "scene", scene, Scene, remedy="Build one.")
         self._choice = None
@@ -96,6 +99,7 @@ class World:
         checks.instance("World", "method", method, Method, remedy="Use Method(Rattle(), Direct()).")
         self._worlds = checks.whole("World", "worlds", worlds, least=1, remedy="Use one.")
         self._threads = checks.whole("World", "threads", threads, least=1, remedy="Use one.")
+        self._special = special
         self._method = method
         self._scene = scene.copy()
         self._compile(None)
@@ -457,7 +461,7 @@ class World:
         return 8 * (self.model.state_rows + len(self._given_rows))
 
     def __getstate__(self) -> dict[str, Any]:
-        names = ("_scene", "_worlds", "_threads", "_method", "_choice", "_state")
+        names = ("_scene", "_worlds", "_threads", "_special", "_method", "_choice", "_state")
         values = list(self.model.parameters.values.values())
         return {name: getattr(self, name) for name in names} | {"values": values}
 
@@ -475,7 +479,7 @@ class World:
 
     def _compile(self, before: World | None) -> None:
         self.scene.check()
-        model = compile_model(self.scene, self.method)
+        model = compile_model(self.scene, self.method, special=self._special)
         state = new_state(model, self.worlds)
         if before is not None:
             carry(before.model, before._state, model, state)
@@ -494,6 +498,8 @@ class World:
         if self.scene.bodies:
             kept = [self.model.parameters.values[BODIES, n] for n in ("damping", "angular_damping")]
             self.model.tape[H_BODIES_DAMPED] = int(any((value != 1.0).any() for value in kept))
+        if self._special:
+            specialise(self.model)
         shared, self._given, self._given_rows = self.model.parameters.rows(self._state.shape[1])
         for scratch, *_ in self._scratch:
             for row, value in shared:

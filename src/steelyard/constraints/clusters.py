@@ -52,6 +52,7 @@ from ..model.tape import (
     H_IMPULSE,
     H_POSITION,
     H_START,
+    H_VELOCITY,
     INERTIA,
     INVERSE,
     LOAD_HEAD,
@@ -258,6 +259,7 @@ def start_clusters(tape, s, velocity):
     Arms sum to zero with the masses as weights, so the moment needs no centre.
     """
     zero = splat(0.0)
+    free = tape[H_VELOCITY] if velocity else tape[H_FREE]
     at = tape[H_CLUSTERS] + 1
     for _ in range(tape[tape[H_CLUSTERS]]):
         work = tape[at + 7]
@@ -273,7 +275,7 @@ def start_clusters(tape, s, velocity):
             entry = at + CLUSTER_HEAD + ENTRY * k
             p = tape[entry]
             m = load(s, tape[entry + 2])
-            x, y, z = load_vector(s, tape[H_FREE] + p)
+            x, y, z = load_vector(s, free + p)
             if not velocity:
                 a, b, c = load_vector(s, tape[H_START] + p)
                 x = x - a
@@ -297,6 +299,18 @@ def start_clusters(tape, s, velocity):
             s, work + BASE, fma(inverse, ux, dx), fma(inverse, uy, dy), fma(inverse, uz, dz)
         )
         store_vector(s, work + BASE + 3, lx, ly, lz)
+        at = cluster_end(tape, at)
+
+
+@inner
+def clear_touched(tape, s):
+    """No impulses on touched particles; those of the others are not read before a stage ends."""
+    zero = splat(0.0)
+    at = tape[H_CLUSTERS] + 1
+    for _ in range(tape[tape[H_CLUSTERS]]):
+        for k in range(tape[at + 2]):
+            p = tape[at + CLUSTER_HEAD + ENTRY * k]
+            store_vector(s, tape[H_IMPULSE] + p, zero, zero, zero)
         at = cluster_end(tape, at)
 
 

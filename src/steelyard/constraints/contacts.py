@@ -66,8 +66,9 @@ def contact_targets(tape, s, dt, skip):
                 s, tape[contact + 10] + component
             )
             weight = fma(relative, relative, weight)
-        reach = dt * (sqrt(square) + dt * sqrt(weight))
-        near = gap < splat(4.0) * reach
+        # Four times as far as speed and acceleration reach, and up to the root of two more.
+        reach = splat(32.0) * dt * dt * fma(dt * dt, weight, square)
+        near = (gap < zero) | (gap * gap < reach)
         tolerance = load(s, tape[H_TOLERANCE])
         # A load that moves nothing is rounding, but would push for ever.
         push = load(s, tape[contact + 15]) * (

@@ -18,6 +18,7 @@ from ..model.tape import (
     H_INVERSE_MASS,
     H_PARTICLES,
     H_POSITION,
+    H_SINGLES,
     H_START,
     H_VELOCITY,
 )
@@ -83,8 +84,10 @@ def add_stage_velocity(tape, s, dt):
 
 @inner
 def keep_free_velocity(tape, s):
-    """Free rows = velocities, from which the velocity stage starts."""
-    for p in range(tape[H_PARTICLES]):
+    """Free rows = velocities, from which the velocity stage starts; rigid clusters sum theirs up at once."""
+    at = tape[H_SINGLES]
+    for index in range(tape[at]):
+        p = tape[at + 1 + index]
         for axis in range(axes(s)):
             row = 3 * p + axis
             store(s, tape[H_FREE] + row, load(s, tape[H_VELOCITY] + row))

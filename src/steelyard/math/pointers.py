@@ -125,6 +125,26 @@ doubles_at = _maker(Doubles)
 planar_doubles_at = _maker(PlanarDoubles)
 
 
+def constant_tape(words: Any) -> Any:
+    """An intrinsic that gives a tape with these words, known when a kernel is compiled."""
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        kind = ir.ArrayType(_INTEGER, len(words))
+        name = "steelyard.tape"
+        tape = builder.module.globals.get(name)
+        if tape is None:
+            tape = ir.GlobalVariable(builder.module, kind, name)
+            tape.linkage = "internal"
+            tape.global_constant = True
+            tape.initializer = ir.Constant(kind, [int(word) for word in words])
+        return builder.bitcast(tape, _INTEGER.as_pointer())
+
+    def make(typing_context: Any) -> Any:
+        return Tape(), codegen
+
+    return intrinsic(make)
+
+
 def _axes(typing_context: Any, rows: Any) -> Any:
     """Number of coordinates that a scene moves in, known when a kernel is compiled."""
 

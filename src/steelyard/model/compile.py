@@ -92,9 +92,10 @@ class Model:
 class Compiler:
     """Allocates rows and writes the tape; one method per kind of thing."""
 
-    def __init__(self, scene: Scene, method: Method) -> None:
+    def __init__(self, scene: Scene, method: Method, *, special: bool) -> None:
         self.scene = scene
         self.method = method
+        self.special = special
         self.model = Model(scene, method)
         self.parameters = self.model.parameters
         self.particles = scene.particles
@@ -434,8 +435,10 @@ class Compiler:
         return self.particles if chosen is None else list(chosen)
 
     def _words(self, recipe: Recipe) -> list[int]:
-        """Stages as they stand on the tape."""
+        """Stages as they stand on the tape; special ones get their addresses when the tape stands (``specialise``)."""
         planar = self.scene.planar
+        if self.special:
+            return [word for _, part in recipe for word in (0, part)]
         return [word for stage, part in recipe for word in (stage.address(planar=planar), part)]
 
     def _method(self) -> None:
@@ -528,12 +531,28 @@ class Compiler:
         model.start = np.array(self.start)
 
 
-def compile_model(scene: Scene, method: Method) -> Model:
-    """Compile a scene for a method.
+def compile_model(scene: Scene, method: Method, *, special: bool = False) -> Model:
+    """Compile a scene for a method; if ``special``, ``specialise`` must follow.
 
     Raises:
-        ValueError: the method cannot do what the scene holds.
+        ValueError: the method cannot do what the scene holds, or its stages call others, which cannot be special.
     """
     method.refuse(scene)
     method = method.for_scene(scene)
-    return Compiler(scene.copy(), method).compile()
+    integrator, solver = method.integrator, method.solver
+    if special and (integrator.splits or integrator.holds_links or (solver and solver.rigid)):
+        raise ValueError(
+            f"World: special is given with {integrator} and {solver}, whose stages call others; it is for those that "
+            "do not. Leave it out."
+        )
+    return Compiler(scene.copy(), method, special=special).compile()
+
+
+def specialise(model: Model) -> None:
+    """Put stages on the tape that are compiled for this tape alone."""
+    at = int(model.tape[tape.H_RECIPE]) + 1
+    model.tape[at : at + 2 * len(model.recipe) : 2] = 0
+    words = model.tape.copy()
+    for index, (stage, part) in enumerate(model.recipe):
+        address = stage.special_address(words, part, planar=model.scene.planar)
+        model.tape[at + 2 * index] = address

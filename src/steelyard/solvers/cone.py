@@ -29,7 +29,7 @@ from ..model.tape import (
     H_TOTAL,
 )
 from . import block_ldl
-from .cone_newton import newton, softened_motion
+from .cone_newton import anchor, newton, softened_motion
 from .cone_rows import relative_motion
 
 _SWEEPS = 200
@@ -57,12 +57,12 @@ def factorise_contacts(tape, s, skip, softness):
 
 
 @inner
-def _stick(tape, s, skip, first):
+def _stick(tape, s, skip, velocity, first):
     """Solve W l = b over the masked rows into the guess rows.
 
     Repeating the solve on what is left of b takes the factor's softness out (the proximal point method), as often as
-    the tolerance asks. The ``first`` of a stage's passes starts from nothing, which spreads friction evenly, others
-    from the guess.
+    the tolerance asks; half as often for velocities, whose softness is the square. The ``first`` of a stage's passes
+    starts from nothing, which spreads friction evenly, others from the guess.
     """
     zero = splat(0.0)
     at = tape[H_CONTACTS]
@@ -73,7 +73,10 @@ def _stick(tape, s, skip, first):
         for row in range(slot, slot + 3):
             value = zero if first else load(s, guess + row) * load(s, tape[H_MASK] + row)
             store(s, total + row, value)
-    for repeat in range(tape[H_REPEATS]):
+    repeats = tape[H_REPEATS]
+    if velocity:
+        repeats = (repeats + 1) >> 1
+    for repeat in range(repeats):
         k = tape[H_CONTACT_PRODUCTS] + 1
         for index in range(tape[at]):
             contact = at + 1 + CONTACT * index
@@ -220,18 +223,6 @@ def _put_back(tape, s, skip, velocity, worlds):
 
 
 @inner
-def _anchor(tape, s, skip):
-    """Softness pulls towards the impulses of the guess."""
-    at = tape[H_CONTACTS]
-    for index in range(tape[at]):
-        contact = at + 1 + CONTACT * index
-        if skip[tape[contact + 20]] == 0:
-            for axis in range(3):
-                value = load(s, tape[H_GUESS] + tape[contact + 19] + axis)
-                store(s, tape[contact + 23] + 3 + axis, value)
-
-
-@inner
 def _pull(tape, s, skip, softness):
     """Largest motion that softness leaves: compliance times the change of an impulse since the anchor."""
     pull = splat(0.0)
@@ -267,15 +258,17 @@ def solve_contacts(tape, s, skip, velocity, allowed, softness, first, hasty):
         contact = at + 1 + CONTACT * index
         if skip[tape[contact + 20]] == 0:
             right = tape[H_RIGHT] + tape[contact + 19]
-            a, b, c = relative_motion(tape, s, skip, k, tape[H_GUESS])
-            store(s, right, load(s, right) + a)
-            store(s, right + 1, load(s, right + 1) + b)
-            store(s, right + 2, load(s, right + 2) + c)
+            if not (velocity and first):
+                # Velocities start from no impulse.
+                a, b, c = relative_motion(tape, s, skip, k, tape[H_GUESS])
+                store(s, right, load(s, right) + a)
+                store(s, right + 1, load(s, right + 1) + b)
+                store(s, right + 2, load(s, right + 2) + c)
             for axis in range(3):
                 held = tape[H_GUESS] + tape[contact + 19] + axis
                 store(s, tape[contact + 23] + axis, load(s, held))
         k += 5 + 4 * tape[k + 4]
-    _stick(tape, s, skip, first)
+    _stick(tape, s, skip, velocity, first)
     bad = _violated(tape, s, skip, velocity)
     stuck = zero > zero
     if hasty:
@@ -283,7 +276,7 @@ def solve_contacts(tape, s, skip, velocity, allowed, softness, first, hasty):
     elif any_lane(bad):
         _put_back(tape, s, skip, velocity, bad)
         for _ in range(_ANCHORS):
-            _anchor(tape, s, skip)
+            anchor(tape, s, skip, bad)
             failed = bad
             if tape[H_DENSE] >= 0:
                 failed = newton(tape, s, skip, velocity, bad, allowed, softness)

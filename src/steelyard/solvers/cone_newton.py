@@ -20,9 +20,24 @@ from ..model.tape import CONTACT, H_CONTACT_PRODUCTS, H_CONTACTS, H_DENSE, H_GUE
 from .cone_rows import put_motion_rows, relative_motion
 
 _ITERATIONS = 15
+# Before so many of them the anchor moves along: what softness leaves need not be taken out afterwards.
+_ANCHORED = 8
 _SETTLED = 1e-11
 # Share of the allowed motion that errors may make.
 _SHARE = 1e-2
+
+
+@inner
+def anchor(tape, s, skip, worlds):
+    """From here on softness pulls towards the impulses of the guess, in the worlds of the mask."""
+    at = tape[H_CONTACTS]
+    for index in range(tape[at]):
+        contact = at + 1 + CONTACT * index
+        if skip[tape[contact + 20]] == 0:
+            for axis in range(3):
+                row = tape[contact + 23] + 3 + axis
+                value = load(s, tape[H_GUESS] + tape[contact + 19] + axis)
+                store(s, row, select(worlds, value, load(s, row)))
 
 
 @inner
@@ -186,6 +201,8 @@ def newton(tape, s, skip, velocity, worlds, allowed, softness):
         full += skip[tape[at + 1 + CONTACT * index + 20]]
     moving = worlds
     for turn in range(_ITERATIONS + 1):
+        if turn < _ANCHORED:
+            anchor(tape, s, skip, moving)
         error = zero
         largest = splat(1e-300)
         most = zero

@@ -66,6 +66,8 @@ _RETRIES = 4
 # Contacts that rigid things join share friction in more ways than one, and what is still to be solved makes them
 # contradict one another: a harder compliance answers that with larger opposing forces.
 _SOFT, _HARD = 1e-3, 1e-5
+# Velocities do not contradict one another. With the square of the softness half of the repeats take it out.
+_FIRM = _SOFT * _SOFT
 _MOST_REPEATS = 4
 
 
@@ -279,7 +281,7 @@ def solve_stage(tape, s, skip, velocity, dt, target, hasty):
     allowed = load(s, tape[H_TOLERANCE])
     if velocity:
         allowed = allowed / dt
-    softness = _HARD if velocity else _SOFT
+    softness = _FIRM if velocity else _SOFT
     if contacts > 0:
         factorise_contacts(tape, s, skip, softness)
     for turn in range(tape[H_PASSES]):
@@ -295,7 +297,7 @@ def solve_stage(tape, s, skip, velocity, dt, target, hasty):
             changed = changed | tighten(tape, s, velocity, dt, others, single)
         # Letting a cable go may stretch another: a world whose set changed has not settled.
         late = changed | _right_rows(tape, s, velocity, dt)
-        if contacts > 0 and not velocity:
+        if contacts > 0 and turn > 0 and not velocity:
             late = late | _missed(tape, s, skip)
         if turn < _RETRIES:
             late = late | stuck

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from ..constraints.clusters import clear_touched
 from ..constraints.contacts import contact_impulses, contact_multiplier
 from ..constraints.links import link_impulses, link_multiplier
 from ..constraints.riders import DECK, HEAD, rider_impulses, rider_multiplier
 from ..kernel import inner
 from ..math.lanes import fma, load, splat, store
 from ..math.pointers import axes
+from ..math.vectors import store_vector
 from ..model.tape import (
     CONTACT,
     H_CONTACTS,
@@ -67,9 +69,13 @@ def gather(tape, s, skip, velocity, target):
     Particles of rigid clusters are moved by these, see ``constraints.clusters``.
     """
     zero = splat(0.0)
-    count = 3 * tape[H_PARTICLES]
-    for row in range(count + 3):
-        store(s, tape[H_IMPULSE] + row, zero)
+    singles = tape[H_SINGLES]
+    for index in range(tape[singles]):
+        p = tape[singles + 1 + index]
+        store_vector(s, tape[H_IMPULSE] + 3 * p, zero, zero, zero)
+    clear_touched(tape, s)
+    # What is fixed takes impulses too, behind the last particle.
+    store_vector(s, tape[H_IMPULSE] + 3 * tape[H_PARTICLES], zero, zero, zero)
     link_impulses(tape, s, velocity)
     rider_impulses(tape, s, velocity)
     contact_impulses(tape, s, skip, velocity)
