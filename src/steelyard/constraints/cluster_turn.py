@@ -20,7 +20,7 @@ from ..model.tape import (
 
 _ITERATIONS = 12
 # Newton's method squares the error: what a change leaves is about its square. It may be this share of the tolerance.
-_SHARE = 1e-2
+_SHARE = 1e-4
 
 
 @inner

@@ -124,8 +124,11 @@ def _mean_arm(tape, s, rider, weights):
 
 
 @inner
-def cluster_frames(tape, s):
-    """Arms and inertia of every cluster at the current positions, with loads where the deck's coefficients say."""
+def cluster_frames(tape, s, velocity):
+    """Arms and inertia of every cluster at the current positions, with loads where the deck's coefficients say.
+
+    Places ask for the centre of mass too, and start without a turn.
+    """
     zero = splat(0.0)
     at = tape[H_CLUSTERS] + 1
     for _ in range(tape[tape[H_CLUSTERS]]):
@@ -173,9 +176,10 @@ def cluster_frames(tape, s):
                 rider += LOAD_HEAD + tape[rider + 4]
         store_vector(s, work + SHIFT, sx, sy, sz)
         symmetric_inverse(s, work + INVERSE, work + INVERSE)
-        x, y, z = _mean(tape, s, at, tape[H_POSITION])
-        store_vector(s, work + CENTRE, x, y, z)
-        store_vector(s, work + TURN, zero, zero, zero)
+        if not velocity:
+            x, y, z = _mean(tape, s, at, tape[H_POSITION])
+            store_vector(s, work + CENTRE, x, y, z)
+            store_vector(s, work + TURN, zero, zero, zero)
         at = cluster_end(tape, at)
 
 

@@ -61,7 +61,7 @@ def _stick(tape, s, skip, velocity, first):
     """Solve W l = b over the masked rows into the guess rows.
 
     Repeating the solve on what is left of b takes the factor's softness out (the proximal point method), as often as
-    the tolerance asks; half as often for velocities, whose softness is the square. The ``first`` of a stage's passes
+    the tolerance asks; once less for velocities, whose softness is the square. The ``first`` of a stage's passes
     starts from nothing, which spreads friction evenly, others from the guess.
     """
     zero = splat(0.0)
@@ -75,7 +75,7 @@ def _stick(tape, s, skip, velocity, first):
             store(s, total + row, value)
     repeats = tape[H_REPEATS]
     if velocity:
-        repeats = (repeats + 1) >> 1
+        repeats = max(repeats - 1, 1)
     for repeat in range(repeats):
         k = tape[H_CONTACT_PRODUCTS] + 1
         for index in range(tape[at]):

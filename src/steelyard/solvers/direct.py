@@ -66,7 +66,7 @@ _RETRIES = 4
 # Contacts that rigid things join share friction in more ways than one, and what is still to be solved makes them
 # contradict one another: a harder compliance answers that with larger opposing forces.
 _SOFT, _HARD = 1e-3, 1e-5
-# Velocities do not contradict one another. With the square of the softness half of the repeats take it out.
+# Velocities do not contradict one another. With the square of the softness one repeat less takes it out.
 _FIRM = _SOFT * _SOFT
 _MOST_REPEATS = 4
 

@@ -24,7 +24,7 @@ def begin_step(tape, s, skip, half):
     link_gradients(tape, s)
     link_targets(tape, s, dt)
     rider_coefficients(tape, s)
-    cluster_frames(tape, s)
+    cluster_frames(tape, s, False)
     contact_geometry(tape, s)
     if contact_targets(tape, s, dt, skip):
         skip[tape[H_BLOCKS] + FRESH] = 1
@@ -36,7 +36,7 @@ def begin_stage(tape, s, half):
     if half == 1:
         link_gradients(tape, s)
         rider_coefficients(tape, s)
-        cluster_frames(tape, s)
+        cluster_frames(tape, s, True)
         keep_free_velocity(tape, s)
 
 
