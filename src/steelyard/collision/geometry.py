@@ -14,7 +14,7 @@ def _ground(s, contact, tape):
     x = tape[contact + 1]
     plane = tape[contact + 11]
     frame = tape[contact + 16]
-    gap = splat(0.0) - load(s, plane + 3) - load(s, tape[contact + 12])
+    gap = -load(s, plane + 3) - load(s, tape[contact + 12])
     for component in range(3):
         normal = load(s, plane + component)
         store(s, frame + component, normal)
@@ -77,7 +77,7 @@ def _user(s, contact, tape):
         store(s, frame + component, load(s, given + component))
     depth = load(s, given + 3)
     far = splat(1e9)
-    store(s, tape[contact + 17], select(depth > splat(0.0), splat(0.0) - depth, far))
+    store(s, tape[contact + 17], select(depth > splat(0.0), -depth, far))
 
 
 @inner
@@ -88,15 +88,15 @@ def _tangents(s, frame):
     nx = load(s, frame)
     ny = load(s, frame + 1)
     nz = load(s, frame + 2)
-    sign = select(nz < zero, zero - one, one)
-    a = (zero - one) / (sign + nz)
+    sign = select(nz < zero, -one, one)
+    a = -one / (sign + nz)
     b = nx * ny * a
     store(s, frame + 3, one + sign * nx * nx * a)
     store(s, frame + 4, sign * b)
-    store(s, frame + 5, zero - sign * nx)
+    store(s, frame + 5, -sign * nx)
     store(s, frame + 6, b)
     store(s, frame + 7, sign + ny * ny * a)
-    store(s, frame + 8, zero - ny)
+    store(s, frame + 8, -ny)
 
 
 @inner

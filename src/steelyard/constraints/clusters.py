@@ -95,15 +95,15 @@ def _turn_inertia(s, row, out, ex, ey, ez, fx, fy, fz, nx, ny, nz):
 @inner
 def _add_point(s, row, m, x, y, z):
     """Add the inertia of a mass at an arm to a matrix in six rows."""
-    zero = splat(0.0)
+    splat(0.0)
     mx = m * x
     my = m * y
     mz = m * z
     store(s, row, fma(my, y, fma(mz, z, load(s, row))))
-    store(s, row + 1, fma(zero - mx, y, load(s, row + 1)))
+    store(s, row + 1, fma(-mx, y, load(s, row + 1)))
     store(s, row + 2, fma(mx, x, fma(mz, z, load(s, row + 2))))
-    store(s, row + 3, fma(zero - mx, z, load(s, row + 3)))
-    store(s, row + 4, fma(zero - my, z, load(s, row + 4)))
+    store(s, row + 3, fma(-mx, z, load(s, row + 3)))
+    store(s, row + 4, fma(-my, z, load(s, row + 4)))
     store(s, row + 5, fma(mx, x, fma(my, y, load(s, row + 5))))
 
 
@@ -153,9 +153,9 @@ def cluster_frames(tape, s, velocity):
         for k in range(tape[at + 1]):
             m = load(s, tape[at + 4] + k)
             x, y, z = _mean_arm(tape, s, rider, tape[rider])
-            x = zero - x
-            y = zero - y
-            z = zero - z
+            x = -x
+            y = -y
+            z = -z
             store_vector(s, tape[rider + 3] + ARM, x, y, z)
             _add_point(s, work + INVERSE, m, x, y, z)
             sx = fma(m, x, sx)
@@ -167,7 +167,7 @@ def cluster_frames(tape, s, velocity):
             sx = sx * inverse
             sy = sy * inverse
             sz = sz * inverse
-            _add_point(s, work + INVERSE, zero - load(s, tape[at + 5]), sx, sy, sz)
+            _add_point(s, work + INVERSE, -load(s, tape[at + 5]), sx, sy, sz)
             for k in range(count):
                 _move(s, work + ARMS + 3 * k, sx, sy, sz)
             rider = cluster_loads(tape, at)
@@ -238,7 +238,7 @@ def _move_loads(tape, s, at, velocity):
             y = y + y0
             z = z + z0
             store_vector(s, own + AFTER, x, y, z)
-        share = zero - m * inverse
+        share = -m * inverse
         dx = fma(share, x, dx)
         dy = fma(share, y, dy)
         dz = fma(share, z, dz)
@@ -345,7 +345,7 @@ def _place(tape, s, at, target, count, finish):
 
     To ``finish``, their impulse rows become those of the whole motion.
     """
-    zero = splat(0.0)
+    splat(0.0)
     two = splat(2.0)
     work = tape[at + 7]
     x, y, z = load_vector(s, work + TURN)
@@ -354,15 +354,15 @@ def _place(tape, s, at, target, count, finish):
     dx, dy, dz = load_vector(s, work + DELTA)
     cx, cy, cz = load_vector(s, work + CENTRE)
     # R - 1 = 2 (q0 [q] + q q^T - q.q).
-    square = zero - dot(x, y, z, x, y, z)
+    square = -dot(x, y, z, x, y, z)
     d00 = two * fma(x, x, square)
     d11 = two * fma(y, y, square)
     d22 = two * fma(z, z, square)
-    d01 = two * fma(x, y, zero - root * z)
+    d01 = two * fma(x, y, -root * z)
     d10 = two * fma(x, y, root * z)
     d02 = two * fma(x, z, root * y)
-    d20 = two * fma(x, z, zero - root * y)
-    d12 = two * fma(y, z, zero - root * x)
+    d20 = two * fma(x, z, -root * y)
+    d12 = two * fma(y, z, -root * x)
     d21 = two * fma(y, z, root * x)
     for k in range(count):
         entry = at + CLUSTER_HEAD + ENTRY * k

@@ -79,7 +79,7 @@ def contact_targets(tape, s, dt, skip):
         leaves = low & (speed * dt > splat(-_RECOVERY) * gap)
         near = (near | carried) & (select(leaves, one, zero) < splat(0.5))
         # An impact this step: closing, and the surface lies within what speed and acceleration cover.
-        fall = zero - speed
+        fall = -speed
         energy = fma(splat(-2.0) * pull, select(gap > zero, gap, zero), fall * fall)
         impact = select(energy > zero, sqrt(energy), zero)
         bounce = select(speed < zero, load(s, tape[contact + 13]) * impact, zero)

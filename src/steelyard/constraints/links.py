@@ -19,7 +19,7 @@ def link_half_square(s, link, tape, length):
     """(d.d - L^2)/2 at the current positions."""
     x, y, z = between(s, tape[link], tape[link + 1])
     square = dot(x, y, z, x, y, z)
-    return splat(0.5) * fma(splat(0.0) - length, length, square)
+    return splat(0.5) * fma(-length, length, square)
 
 
 @inner

@@ -20,26 +20,26 @@ DECK = 4
 @inner
 def rider_offset(s, tape, rider, component):
     """x - sum of w_i x_i, one component."""
-    zero = splat(0.0)
+    splat(0.0)
     weights = tape[rider + 7]
     value = load(s, tape[rider] + component)
     for k in range(tape[rider + 6]):
         x = tape[rider + HEAD + DECK * k]
-        value = fma(zero - load(s, weights + k), load(s, x + component), value)
+        value = fma(-load(s, weights + k), load(s, x + component), value)
     return value
 
 
 @inner
 def rider_slip(s, tape, rider, component):
     """v - sum of (w_i v_i + dw_i/dt x_i), one component."""
-    zero = splat(0.0)
+    splat(0.0)
     weights = tape[rider + 7]
     rates = tape[rider + 8]
     value = load(s, tape[rider + 1] + component)
     for k in range(tape[rider + 6]):
         deck = rider + HEAD + DECK * k
-        value = fma(zero - load(s, weights + k), load(s, tape[deck + 1] + component), value)
-        value = fma(zero - load(s, rates + k), load(s, tape[deck] + component), value)
+        value = fma(-load(s, weights + k), load(s, tape[deck + 1] + component), value)
+        value = fma(-load(s, rates + k), load(s, tape[deck] + component), value)
     return value
 
 
@@ -50,7 +50,7 @@ def rider_coefficients(tape, s):
     for index in range(tape[at]):
         mover = at + 1 + 5 * index
         for k in range(tape[mover]):
-            store(s, tape[mover + 4] + k, splat(0.0) - load(s, tape[mover + 1] + k))
+            store(s, tape[mover + 4] + k, -load(s, tape[mover + 1] + k))
 
 
 @inner

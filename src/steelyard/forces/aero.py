@@ -26,11 +26,11 @@ def _row(s, k, tape, row, x, y, z):
         one = splat(1.0)
         control = load(s, tape[k + 7])
         control = select(control > one, one, control)
-        control = select(control < zero - one, zero - one, control)
+        control = select(control < -one, -one, control)
         for side in range(2):
             change = tape[k + 5 + side] + 3 * row
             more = dot(load(s, change), load(s, change + 1), load(s, change + 2), x, y, z)
-            share = zero - control if side == 0 else control
+            share = -control if side == 0 else control
             value = fma(select(share > zero, share, zero), more, value)
     return value
 

@@ -32,7 +32,7 @@ def add_drag(tape, s):
     for index in range(tape[at]):
         k = at + 1 + RECORD * index
         x, y, z, speed = _through_air(tape, s, k)
-        brake = splat(0.0) - fma(load(s, tape[k + 3]), speed, load(s, tape[k + 2]))
+        brake = -fma(load(s, tape[k + 3]), speed, load(s, tape[k + 2]))
         add_scaled(s, tape[k + 1], brake, x, y, z)
 
 

@@ -52,7 +52,7 @@ def add_explosions(tape, s):
         duration = load(s, row + 1)
         near = (distance > load(s, row + 2)) & (distance < load(s, row + 3))
         pulls = (time >= zero) & (time < duration) & near
-        force = select(pulls, zero - load(s, row), zero)
+        force = select(pulls, -load(s, row), zero)
         since = time - duration
         lag = absolute(distance - load(s, row + 6) * since)
         share = one - lag / load(s, row + 7)

@@ -29,9 +29,9 @@ def add_springs(tape, s):
         if tape[k + 6] == ONE_SIDED:
             stretch = select(stretch > zero, stretch, zero)
         elif tape[k + 6] == REST_ALONE:
-            stretch = zero - load(s, tape[k + 5])
+            stretch = -load(s, tape[k + 5])
         apart = length > zero
         pull = load(s, tape[k + 4]) * stretch / select(apart, length, splat(1.0))
-        pull = select(apart, zero - pull, zero)
+        pull = select(apart, -pull, zero)
         add_scaled(s, tape[k + 2], pull, x, y, z)
-        add_scaled(s, tape[k + 3], zero - pull, x, y, z)
+        add_scaled(s, tape[k + 3], -pull, x, y, z)

@@ -307,7 +307,7 @@ def _motion_rows(tape, s):
             rounding = rounding + mass * (absolute(x) + absolute(free))
             if tape[H_IMPULSE] >= 0:
                 pulled = pulled + load(s, tape[H_IMPULSE] + row)
-            rest = fma(square, pulled, zero - moved)
+            rest = fma(square, pulled, -moved)
             store(s, tape[k + 2] + axis, rest)
             left = left + absolute(rest)
         if tape[H_IMPULSE] >= 0:

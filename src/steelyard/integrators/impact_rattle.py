@@ -127,7 +127,7 @@ def _slack(tape, s, link):
 @inner
 def _apart(gap, rate, rest, dt):
     """Whether a gap is open or closing: not at rest at 0, where there is no impact to resolve."""
-    return (gap > rest) | (rate * dt > rest) | (rate * dt < splat(0.0) - rest)
+    return (gap > rest) | (rate * dt > rest) | (rate * dt < -rest)
 
 
 @stage
@@ -201,7 +201,7 @@ def _earliest(s, event, gap, rate, first, length, active, time):
             found = select(closes, fallen, found)
     else:
         closing = free & (rate < zero)
-        found = length + gap / select(closing, zero - rate, splat(1.0))
+        found = length + gap / select(closing, -rate, splat(1.0))
         found = select(closing, found, time)
     return select(found < time, found, time)
 
@@ -233,9 +233,9 @@ def _note(s, event, gap, rate, restitution, meets, near):
     """What closes at the end of this part, and how it rebounds."""
     zero = splat(0.0)
     closing = meets & (load(s, event + _FREE) > splat(0.5)) & (rate < zero)
-    closes = closing & (gap < (zero - rate) * near)
+    closes = closing & (gap < -rate * near)
     store(s, event + _CLOSES, select(closes, splat(1.0), zero))
-    store(s, event + _LEAVES, select(closes, zero - restitution * rate, zero))
+    store(s, event + _LEAVES, select(closes, -restitution * rate, zero))
 
 
 @inner

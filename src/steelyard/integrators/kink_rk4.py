@@ -85,7 +85,7 @@ def _kink(tape, s, record):
     if tape[record] == FLOAT_TOP or tape[record] == FLOAT_BOTTOM:
         half = load(s, tape[record + 3])
         if tape[record] == FLOAT_TOP:
-            half = splat(0.0) - half
+            half = -half
         return load(s, a) - load(s, tape[record + 2]) + half, load(s, a + to_velocity)
     b = tape[record + 2]
     x, y, z = between(s, a, b)
@@ -111,7 +111,7 @@ def _note_kinks(tape, s):
         leaning = select(absolute(place) > splat(_NEAR), place, rate)
         store(s, event + _PLACE, place)
         store(s, event + _RATE, rate)
-        store(s, event + _SIDE, select(leaning > splat(0.0), one, splat(0.0) - one))
+        store(s, event + _SIDE, select(leaning > splat(0.0), one, -one))
         event += 3
 
 
@@ -140,7 +140,7 @@ def _first_crossing(tape, s, first, length, left):
                 time = select(found < time, found, time)
         else:
             closing = later_rate < zero
-            found = length + later / select(closing, zero - later_rate, splat(1.0))
+            found = length + later / select(closing, -later_rate, splat(1.0))
             found = select(closing, found, time)
             time = select(found < time, found, time)
         event += 3

@@ -131,7 +131,7 @@ def rk4_part(tape, s, skip, part):
             if tape[H_FORCED] != 0:
                 a = fma(inverse, load(s, tape[H_FORCE] + row), a)
             if tape[H_DAMPED] != 0:
-                a = fma(splat(0.0) - load(s, tape[H_DAMPING] + p), v, a)
+                a = fma(-load(s, tape[H_DAMPING] + p), v, a)
             place = tape[H_POSITION] + row
             _advance_row(s, part, weight, reach, place, start + row, total + row, v)
             place = tape[H_VELOCITY] + row
@@ -164,13 +164,13 @@ def rk4_bodies_part(tape, s, skip, part):
         ox, oy, oz = in_frame(s, tape[body + 7], f, w, x, y, z, lx, ly, lz)
         wrench = tape[body + 4]
         push = load(s, tape[body + 5])
-        brake = zero - load(s, tape[body + 9])
+        brake = -load(s, tape[body + 9])
         fx, fy, fz = load_vector(s, wrench)
         ax, ay, az = load_vector(s, tape[body + 8])
         ax = fma(brake, vx, fma(push, fx, ax))
         ay = fma(brake, vy, fma(push, fy, ay))
         az = fma(brake, vz, fma(push, fz, az))
-        brake = zero - load(s, tape[body + 9] + 1)
+        brake = -load(s, tape[body + 9] + 1)
         rx, ry, rz = load_vector(s, wrench + 3)
         if tape[body + 12] >= 0:
             gx, gy, gz = weight_torque(tape, s, body)

@@ -41,7 +41,7 @@ def quaternion_product(aw, ax, ay, az, bw, bx, by, bz):
     """a b: first the rotation b, then a."""
     cx, cy, cz = cross(ax, ay, az, bx, by, bz)
     return (
-        fma(aw, bw, splat(0.0) - dot(ax, ay, az, bx, by, bz)),
+        fma(aw, bw, -dot(ax, ay, az, bx, by, bz)),
         fma(aw, bx, fma(bw, ax, cx)),
         fma(aw, by, fma(bw, ay, cy)),
         fma(aw, bz, fma(bw, az, cz)),
@@ -79,8 +79,8 @@ def rotate(factor, w, x, y, z, a, b, c):
 @inner
 def rotate_back(factor, w, x, y, z, a, b, c):
     """The vector (a, b, c) from the world's frame to the body's."""
-    zero = splat(0.0)
-    return rotate(factor, w, zero - x, zero - y, zero - z, a, b, c)
+    splat(0.0)
+    return rotate(factor, w, -x, -y, -z, a, b, c)
 
 
 @inner

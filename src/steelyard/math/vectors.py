@@ -59,11 +59,11 @@ def dot(ax, ay, az, bx, by, bz):
 @inner
 def cross(ax, ay, az, bx, by, bz):
     """Vector product."""
-    zero = splat(0.0)
+    splat(0.0)
     return (
-        fma(ay, bz, zero - az * by),
-        fma(az, bx, zero - ax * bz),
-        fma(ax, by, zero - ay * bx),
+        fma(ay, bz, -az * by),
+        fma(az, bx, -ax * bz),
+        fma(ax, by, -ay * bx),
     )
 
 
@@ -98,23 +98,23 @@ def _reciprocal(value):
 @inner
 def symmetric_inverse(s, row, out):
     """Inverse of a symmetric matrix in six rows, into six others."""
-    zero = splat(0.0)
+    splat(0.0)
     a = load(s, row)
     b = load(s, row + 1)
     c = load(s, row + 2)
     d = load(s, row + 3)
     e = load(s, row + 4)
     f = load(s, row + 5)
-    c00 = fma(c, f, zero - e * e)
-    c10 = fma(d, e, zero - b * f)
-    c20 = fma(b, e, zero - c * d)
+    c00 = fma(c, f, -e * e)
+    c10 = fma(d, e, -b * f)
+    c20 = fma(b, e, -c * d)
     inverse = _reciprocal(dot(a, b, d, c00, c10, c20))
     store(s, out, inverse * c00)
     store(s, out + 1, inverse * c10)
-    store(s, out + 2, inverse * fma(a, f, zero - d * d))
+    store(s, out + 2, inverse * fma(a, f, -d * d))
     store(s, out + 3, inverse * c20)
-    store(s, out + 4, inverse * fma(b, d, zero - a * e))
-    store(s, out + 5, inverse * fma(a, c, zero - b * b))
+    store(s, out + 4, inverse * fma(b, d, -a * e))
+    store(s, out + 5, inverse * fma(a, c, -b * b))
 
 
 @inner

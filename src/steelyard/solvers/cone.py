@@ -178,8 +178,8 @@ def _sweep(tape, s, skip, velocity, worlds, allowed, softness):
                 w22 = load(s, w + 5) + soft
                 size = select(w11 > w22, w11, w22) + absolute(load(s, w + 4))
                 inverse = select(size > zero, splat(1.0) / size, zero)
-                t = fma(zero - inverse, b, t0)
-                u = fma(zero - inverse, c, u0)
+                t = fma(-inverse, b, t0)
+                u = fma(-inverse, c, u0)
                 bound = load(s, tape[contact + 14]) * select(n > zero, n, zero)
                 length = sqrt(fma(u, u, t * t))
                 outside = length > bound

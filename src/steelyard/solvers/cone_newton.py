@@ -99,7 +99,7 @@ def _contact_system(tape, s, skip, contact, k, velocity, first, width, softness,
     # Normal: u_n = 0 where closed, l_n = 0 where open.
     own = row + slot - first
     normal_error = select(closed > half, rn * un, n)
-    store(s, row + last, zero - normal_error)
+    store(s, row + last, -normal_error)
     # Tangents: where they slide, l_t = mu l_n e with e the direction of l_t - r_t u_t.
     pt = t - rt * ut
     pu = u - rt * uu
@@ -112,7 +112,7 @@ def _contact_system(tape, s, skip, contact, k, velocity, first, width, softness,
     eu = pu * shorter
     share = select(slides, bound * shorter, closed)
     p00 = select(slides, one - et * et, one)
-    p01 = select(slides, zero - et * eu, zero)
+    p01 = select(slides, -et * eu, zero)
     p11 = select(slides, one - eu * eu, one)
     k00 = share * p00
     k01 = share * p01
@@ -133,8 +133,8 @@ def _contact_system(tape, s, skip, contact, k, velocity, first, width, softness,
     sticks = closed > half
     error_t = select(slides, t - bound * et, select(sticks, rt * ut, t))
     error_u = select(slides, u - bound * eu, select(sticks, rt * uu, u))
-    store(s, next_ + last, zero - error_t)
-    store(s, other + last, zero - error_u)
+    store(s, next_ + last, -error_t)
+    store(s, other + last, -error_u)
     tangential = absolute(error_t) + absolute(error_u)
     error = absolute(normal_error) + tangential
     moved = fma(motion_t, tangential, motion_n * absolute(normal_error))
@@ -144,7 +144,7 @@ def _contact_system(tape, s, skip, contact, k, velocity, first, width, softness,
 @inner
 def _eliminate(s, dense, count):
     """Solve the dense system in place by blocks of three, last column the right side."""
-    zero = splat(0.0)
+    splat(0.0)
     size = 3 * count
     width = size + 1
     for k in range(count):
@@ -165,17 +165,17 @@ def _eliminate(s, dense, count):
             store(s, at, u)
             store(s, at + width, v)
             store(s, at + 2 * width, w)
-            u = zero - u
-            v = zero - v
-            w = zero - w
+            u = -u
+            v = -v
+            w = -w
             for below in range(3 * k + 3, size):
                 x, y, z = load_vector(s, dense + below * width + 3 * k)
                 at = dense + below * width + column
                 store(s, at, fma(z, w, fma(y, v, fma(x, u, load(s, at)))))
     for k in range(count - 1, 0, -1):
-        u = zero - load(s, dense + 3 * k * width + size)
-        v = zero - load(s, dense + (3 * k + 1) * width + size)
-        w = zero - load(s, dense + (3 * k + 2) * width + size)
+        u = -load(s, dense + 3 * k * width + size)
+        v = -load(s, dense + (3 * k + 1) * width + size)
+        w = -load(s, dense + (3 * k + 2) * width + size)
         for above in range(3 * k):
             x, y, z = load_vector(s, dense + above * width + 3 * k)
             at = dense + above * width + size

@@ -101,7 +101,7 @@ class Direct(Solver):
 @inner
 def _contact_rows(tape, s, skip, velocity):
     """Right-hand sides of the contacts: minus the relative motion still unwanted."""
-    zero = splat(0.0)
+    splat(0.0)
     at = tape[H_CONTACTS]
     for index in range(tape[at]):
         contact = at + 1 + CONTACT * index
@@ -110,12 +110,12 @@ def _contact_rows(tape, s, skip, velocity):
             if velocity:
                 wanted = load(s, tape[contact + 18] + 2)
                 store(s, slot, wanted - contact_speed(s, tape, contact, 0))
-                store(s, slot + 1, zero - contact_speed(s, tape, contact, 1))
-                store(s, slot + 2, zero - contact_speed(s, tape, contact, 2))
+                store(s, slot + 1, -contact_speed(s, tape, contact, 1))
+                store(s, slot + 2, -contact_speed(s, tape, contact, 2))
             else:
-                store(s, slot, zero - contact_gap(s, tape, contact))
-                store(s, slot + 1, zero - contact_shift(s, tape, contact, 1))
-                store(s, slot + 2, zero - contact_shift(s, tape, contact, 2))
+                store(s, slot, -contact_gap(s, tape, contact))
+                store(s, slot + 1, -contact_shift(s, tape, contact, 1))
+                store(s, slot + 2, -contact_shift(s, tape, contact, 2))
 
 
 @inner
@@ -134,7 +134,7 @@ def _missed(tape, s, skip):
             gap = contact_gap(s, tape, contact)
             loaded = load(s, contact_multiplier(tape, contact, False)) > zero
             possible = load(s, tape[contact + 18]) > splat(0.5)
-            missed = missed | (possible & (gap < zero - allowed)) | (loaded & (gap > allowed))
+            missed = missed | (possible & (gap < -allowed)) | (loaded & (gap > allowed))
     return missed
 
 
@@ -210,7 +210,7 @@ def _right_rows(tape, s, velocity, dt):
             allowed = allowed / dt
         for axis in range(axes(s)):
             error = rider_slip(s, tape, at, axis) if velocity else rider_offset(s, tape, at, axis)
-            store(s, tape[H_RIGHT] + tape[at + 4] + axis, zero - error)
+            store(s, tape[H_RIGHT] + tape[at + 4] + axis, -error)
             bad = bad | (absolute(error) > allowed)
         at += HEAD + DECK * tape[at + 6]
     return bad

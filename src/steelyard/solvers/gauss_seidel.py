@@ -104,7 +104,7 @@ def _sweep_links(tape, s, velocity):
             new = select(may, new, zero)
         store(s, row, new)
         change = new - old
-        _push(s, a, load(s, tape[link + 6]), d, change, zero - one)
+        _push(s, a, load(s, tape[link + 6]), d, change, -one)
         if tape[link + 5] < tape[H_IMPULSE] + 3 * tape[H_PARTICLES]:
             _push(s, b, load(s, tape[link + 7]), d, change, one)
 
@@ -112,7 +112,7 @@ def _sweep_links(tape, s, velocity):
 @inner
 def sweep_riders(tape, s, velocity):
     """One sweep over the riders."""
-    zero = splat(0.0)
+    splat(0.0)
     at = tape[H_RIDERS] + 1
     for _ in range(tape[tape[H_RIDERS]]):
         count = tape[at + 6]
@@ -124,7 +124,7 @@ def sweep_riders(tape, s, velocity):
         place = 1 if velocity else 0
         for axis in range(axes(s)):
             error = rider_slip(s, tape, at, axis) if velocity else rider_offset(s, tape, at, axis)
-            change = zero - error / total
+            change = -error / total
             row = rider_multiplier(tape, at, velocity) + axis
             store(s, row, load(s, row) + change)
             x = tape[at + place] + axis
@@ -171,7 +171,7 @@ def sweep_contacts(tape, s, skip, velocity):
         _push(s, a, ma, frame, new - old, one)
         two = tape[contact + 6] < tape[H_IMPULSE] + 3 * tape[H_PARTICLES]
         if two:
-            _push(s, b, mb, frame, new - old, zero - one)
+            _push(s, b, mb, frame, new - old, -one)
         if velocity:
             t = contact_speed(s, tape, contact, 1)
             u = contact_speed(s, tape, contact, 2)
@@ -192,10 +192,10 @@ def sweep_contacts(tape, s, skip, velocity):
         store(s, row + 2, u)
         _push(s, a, ma, frame + 3, t - t0, one)
         if two:
-            _push(s, b, mb, frame + 3, t - t0, zero - one)
+            _push(s, b, mb, frame + 3, t - t0, -one)
         _push(s, a, ma, frame + 6, u - u0, one)
         if two:
-            _push(s, b, mb, frame + 6, u - u0, zero - one)
+            _push(s, b, mb, frame + 6, u - u0, -one)
 
 
 @stage

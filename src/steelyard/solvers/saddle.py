@@ -67,7 +67,7 @@ def _masses(tape, s, rate):
 @inner
 def _links(tape, s, square):
     """Rows of J and the geometric stiffness, times ``square``."""
-    zero = splat(0.0)
+    splat(0.0)
     at = tape[H_LINKS]
     for index in range(tape[at]):
         link = at + 1 + LINK * index
@@ -80,7 +80,7 @@ def _links(tape, s, square):
             if tape[k + 2] >= 0:
                 store(s, tape[k + 2] + axis, part)
             if tape[k + 3] >= 0:
-                store(s, tape[k + 3] + axis, zero - part)
+                store(s, tape[k + 3] + axis, -part)
         pull = square * load(s, tape[link + 12]) * taut
         lowest = load(s, tape[k + 9])
         pull = select(pull > lowest, pull, lowest)

@@ -93,7 +93,7 @@ def keep_multipliers(tape, s):
         error = link_half_square(s, link, tape, length)
         near = _near(tape, s, length)
         over = error > near
-        short = error < zero - near
+        short = error < -near
         if tape[link + 10] == 0:
             over = over | short
         store(s, tape[link + 14] + 1, select(over, one, zero))
@@ -141,14 +141,14 @@ def position_rows(tape, s, active, single):
             lets_go = flips & (now < half)
             store(s, tape[link + 12], select(lets_go, zero, multiplier))
             error = error * now
-        store(s, tape[tape[H_SADDLE_LINKS] + 1 + SADDLE_LINK * index], zero - error)
+        store(s, tape[tape[H_SADDLE_LINKS] + 1 + SADDLE_LINK * index], -error)
         bad = bad | (absolute(error) > allowed)
     at = tape[H_RIDERS] + 1
     k = tape[H_SADDLE_RIDERS] + 1
     for _ in range(tape[tape[H_RIDERS]]):
         for axis in range(axes(s)):
             error = rider_offset(s, tape, at, axis)
-            store(s, tape[k] + axis, zero - error)
+            store(s, tape[k] + axis, -error)
             bad = bad | (absolute(error) > tolerance)
         k += 4 + 3 * tape[at + 6]
         at += HEAD + DECK * tape[at + 6]
@@ -200,7 +200,7 @@ def taut_at_rest(tape, s, dt):
         taut = one
         if tape[link + 10] != 0:
             length = load(s, tape[link + 8])
-            least = zero - _near(tape, s, length)
+            least = -_near(tape, s, length)
             rate = link_rate(s, link, tape) - length * load(s, tape[link + 9])
             stays = (link_half_square(s, link, tape, length) > least) & (dt * rate > least)
             taut = select(stays, one, zero)
@@ -284,7 +284,7 @@ def take_multipliers(tape, s, worlds):
     for _ in range(tape[tape[H_RIDERS]]):
         for axis in range(axes(s)):
             row = tape[at + 3] + axis
-            value = zero - load(s, tape[k] + axis)
+            value = -load(s, tape[k] + axis)
             store(s, row, select(worlds, value, load(s, row)))
         k += 4 + 3 * tape[at + 6]
         at += HEAD + DECK * tape[at + 6]
@@ -318,7 +318,7 @@ def velocity_rows(tape, s):
     k = tape[H_SADDLE_RIDERS] + 1
     for _ in range(tape[tape[H_RIDERS]]):
         for axis in range(axes(s)):
-            store(s, tape[k] + axis, splat(0.0) - rider_slip(s, tape, at, axis))
+            store(s, tape[k] + axis, -rider_slip(s, tape, at, axis))
         k += 4 + 3 * tape[at + 6]
         at += HEAD + DECK * tape[at + 6]
 

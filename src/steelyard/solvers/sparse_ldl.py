@@ -29,12 +29,12 @@ _PIVOT = 1e-13
 @inner
 def _subtract_runs(tape, at, count, s, value):
     """Value less the sum of the products of the runs at ``at``."""
-    zero = splat(0.0)
+    splat(0.0)
     for run in range(count):
         left = tape[at + 3 * run]
         right = tape[at + 3 * run + 1]
         for k in range(tape[at + 3 * run + 2]):
-            value = fma(zero - load(s, left + k), load(s, right + k), value)
+            value = fma(-load(s, left + k), load(s, right + k), value)
     return value
 
 

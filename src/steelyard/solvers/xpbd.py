@@ -121,7 +121,7 @@ def _pull(s, x, impulse, weight, nx, ny, nz, change):
 @inner
 def _draw_together(tape, s, a, b, fa, fb, wa, wb, nx, ny, nz, change):
     """Pull both ends together; an anchor stays."""
-    _pull(s, a, fa, wa, nx, ny, nz, splat(0.0) - change)
+    _pull(s, a, fa, wa, nx, ny, nz, -change)
     if fb < tape[H_IMPULSE] + 3 * tape[H_PARTICLES]:
         _pull(s, b, fb, wb, nx, ny, nz, change)
 
@@ -140,7 +140,7 @@ def _project_springs(tape, s, square_dt):
         stiffness = load(s, tape[k + 6]) * square_dt
         row = tape[k + 9]
         old = load(s, row)
-        error = fma(stiffness, distance - load(s, tape[k + 7]), zero - old)
+        error = fma(stiffness, distance - load(s, tape[k + 7]), -old)
         new = old + error / fma(stiffness, wa + wb, one)
         if tape[k + 8] != 0:
             new = select(new > zero, new, zero)
