@@ -1,4 +1,6 @@
-"""What a method of one's own is written with: an ``Integrator`` in one file, beside those of ``integrators``.
+"""What methods and environments of one's own are written with.
+
+A method is an ``Integrator`` in one file, beside those of ``integrators``.
 
     class MyMethod(sy.extension.Integrator):
         def recipe(self, solver, acting): return ((my_step, 0),)
@@ -10,6 +12,9 @@
 
 Stages are written in lane vectors (``math.lanes``), one number for each of eight worlds, on rows of the scratch that
 the tape names (``model.tape``). The file of any method shows how.
+
+Kernels of an environment loop over worlds. Where that takes as long as the physics, they can take eight at a time too, from
+whole arrays (``math.array_lanes``), as those of Platform do.
 """
 
 from .forces.accumulate import accumulate_forces
@@ -17,12 +22,15 @@ from .forces.springs import add_springs
 from .integrators.base import Acting, Integrator, Recipe
 from .integrators.motion import damp, drift, kick
 from .kernel import inner
+from .math.array_lanes import load_column, load_row, store_column, store_row
 from .math.lanes import absolute, any_lane, fma, load, select, splat, sqrt, store
+from .math.pointers import LANES
 from .model import tape
 from .solvers.base import Solver
 from .stage import Stage, stage
 
 __all__ = [
+    "LANES",
     "Acting",
     "Integrator",
     "Recipe",
@@ -38,10 +46,14 @@ __all__ = [
     "inner",
     "kick",
     "load",
+    "load_column",
+    "load_row",
     "select",
     "splat",
     "sqrt",
     "stage",
     "store",
+    "store_column",
+    "store_row",
     "tape",
 ]

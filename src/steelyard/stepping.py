@@ -154,7 +154,7 @@ def _store_block(tape, s, state, width, picked, count, whole, loaded):
                 store_at(state, entry, select(given_up, load_at(state, entry), load(s, row)))
             else:
                 for k in range(count):
-                    if s[tape[H_GIVEN_UP], k] < 0.5:
+                    if every or s[tape[H_GIVEN_UP], k] < 0.5:
                         state[width * row + picked[k]] = s[row, k]
         row += 1
         if row >= loaded:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..kernel import inner
-from ..math.lanes import any_lane, fma, load, select, splat, sqrt, store
+from ..math.lanes import any_lane, fma, load, select, splat, store
 from ..math.vectors import cross, dot, load_vector, solve, store_vector, symmetric_product
 from ..model.tape import (
     AFTER,
@@ -39,18 +39,10 @@ def cluster_end(tape, at):
 
 
 @inner
-def turn_root(x, y, z):
-    """q0 of a unit quaternion."""
-    least = splat(1e-3)
-    root = splat(1.0) - dot(x, y, z, x, y, z)
-    return sqrt(select(root > least, root, least))
-
-
-@inner
 def turn(tape, s, at, hx, hy, hz, worlds):
-    """Find the quaternion that solves the moment's equation, from the one at hand; it stays in the work rows.
+    """Find the turn that solves the moment's equation, from the one at hand; it stays in the work rows.
 
-    At first that is of no turn, where the equation's derivative is the inertia.
+    At first that is none, where the equation's derivative is the inertia.
     """
     zero = splat(0.0)
     one = splat(1.0)
@@ -71,74 +63,66 @@ def turn(tape, s, at, hx, hy, hz, worlds):
         x = select(at_rest, u, x)
         y = select(at_rest, v, y)
         z = select(at_rest, w, z)
-    root = turn_root(x, y, z)
     moving = worlds
     for _ in range(_ITERATIONS):
         u, v, w = symmetric_product(s, row, x, y, z)
         gx, gy, gz = cross(x, y, z, u, v, w)
-        ex = hx - fma(root, u, gx)
-        ey = hy - fma(root, v, gy)
-        ez = hz - fma(root, w, gz)
-        # Derivative of the particles' part: q0 J - (J q) q^T / q0 + [q] J - [J q], column by column.
-        share = -one / root
-        sx = share * x
-        sy = share * y
-        sz = share * z
+        square = dot(x, y, z, x, y, z) + one
+        ex = fma(square, hx, -u) - gx
+        ey = fma(square, hy, -v) - gy
+        ez = fma(square, hz, -w) - gz
+        # Derivative of the particles' part: J + [g] J - [J g] - 2 h g^T, column by column.
+        sx = -two * x
+        sy = -two * y
+        sz = -two * z
         ax, ay, az = cross(x, y, z, j00, j10, j20)
-        ax = fma(u, sx, fma(root, j00, ax))
-        ay = fma(v, sx, fma(root, j10, ay)) - w
-        az = fma(w, sx, fma(root, j20, az)) + v
+        ax = fma(hx, sx, j00 + ax)
+        ay = fma(hy, sx, j10 + ay) - w
+        az = fma(hz, sx, j20 + az) + v
         bx, by, bz = cross(x, y, z, j10, j11, j21)
-        bx = fma(u, sy, fma(root, j10, bx)) + w
-        by = fma(v, sy, fma(root, j11, by))
-        bz = fma(w, sy, fma(root, j21, bz)) - u
+        bx = fma(hx, sy, j10 + bx) + w
+        by = fma(hy, sy, j11 + by)
+        bz = fma(hz, sy, j21 + bz) - u
         cx, cy, cz = cross(x, y, z, j20, j21, j22)
-        cx = fma(u, sz, fma(root, j20, cx)) - v
-        cy = fma(v, sz, fma(root, j21, cy)) + u
-        cz = fma(w, sz, fma(root, j22, cz))
+        cx = fma(hx, sz, j20 + cx) - v
+        cy = fma(hy, sz, j21 + cy) + u
+        cz = fma(hz, sz, j22 + cz)
         rider = cluster_loads(tape, at)
         for _ in range(tape[at + 1]):
-            # Of a load's: (R - 1) r = 2 (q0 q x r + q x (q x r)), between r0 and the change of q.
+            # Of a load's: t + g x t with t = g x r1, between r0 and the change of g.
             px, py, pz = load_vector(s, tape[rider + 3] + BEFORE)
             rx, ry, rz = load_vector(s, tape[rider + 3] + AFTER)
             tx, ty, tz = cross(x, y, z, rx, ry, rz)
             ox, oy, oz = cross(x, y, z, tx, ty, tz)
-            ox, oy, oz = cross(px, py, pz, fma(root, tx, ox), fma(root, ty, oy), fma(root, tz, oz))
-            ex = fma(-two, ox, ex)
-            ey = fma(-two, oy, ey)
-            ez = fma(-two, oz, ez)
-            # Columns of -t q^T/q0 - [q0 r + t] + (q.r) 1 - r q^T, and p x them.
-            nx = fma(root, rx, tx)
-            ny = fma(root, ry, ty)
-            nz = fma(root, rz, tz)
+            ox, oy, oz = cross(px, py, pz, tx + ox, ty + oy, tz + oz)
+            ex = ex - ox
+            ey = ey - oy
+            ez = ez - oz
+            # Columns of (g.r) 1 + g r^T - 2 r g^T - [r], and p x them.
             along = dot(x, y, z, rx, ry, rz)
-            ox = fma(tx, sx, fma(-rx, x, along))
-            oy = fma(ty, sx, fma(-ry, x, -nz))
-            oz = fma(tz, sx, fma(-rz, x, ny))
-            ox, oy, oz = cross(px, py, pz, ox, oy, oz)
-            ax = fma(two, ox, ax)
-            ay = fma(two, oy, ay)
-            az = fma(two, oz, az)
-            ox = fma(tx, sy, fma(-rx, y, nz))
-            oy = fma(ty, sy, fma(-ry, y, along))
-            oz = fma(tz, sy, fma(-rz, y, -nx))
-            ox, oy, oz = cross(px, py, pz, ox, oy, oz)
-            bx = fma(two, ox, bx)
-            by = fma(two, oy, by)
-            bz = fma(two, oz, bz)
-            ox = fma(tx, sz, fma(-rx, z, -ny))
-            oy = fma(ty, sz, fma(-ry, z, nx))
-            oz = fma(tz, sz, fma(-rz, z, along))
-            ox, oy, oz = cross(px, py, pz, ox, oy, oz)
-            cx = fma(two, ox, cx)
-            cy = fma(two, oy, cy)
-            cz = fma(two, oz, cz)
+            ox, oy, oz = cross(
+                px, py, pz, fma(-rx, x, along), fma(ry, sx, fma(y, rx, -rz)), fma(rz, sx, fma(z, rx, ry))
+            )  # fmt: skip
+            ax = ax + ox
+            ay = ay + oy
+            az = az + oz
+            ox, oy, oz = cross(
+                px, py, pz, fma(rx, sy, fma(x, ry, rz)), fma(-ry, y, along), fma(rz, sy, fma(z, ry, -rx))
+            )  # fmt: skip
+            bx = bx + ox
+            by = by + oy
+            bz = bz + oz
+            ox, oy, oz = cross(
+                px, py, pz, fma(rx, sz, fma(x, rz, -ry)), fma(ry, sz, fma(y, rz, rx)), fma(-rz, z, along)
+            )  # fmt: skip
+            cx = cx + ox
+            cy = cy + oy
+            cz = cz + oz
             rider += LOAD_HEAD + tape[rider + 4]
         ox, oy, oz = solve(ax, ay, az, bx, by, bz, cx, cy, cz, ex, ey, ez)
         x = x + select(moving, ox, zero)
         y = y + select(moving, oy, zero)
         z = z + select(moving, oz, zero)
-        root = turn_root(x, y, z)
         moving = moving & (dot(ox, oy, oz, ox, oy, oz) > allowed)
         if not any_lane(moving):
             break

@@ -6,12 +6,12 @@ impulses and its moment about the start's places at zero. So the position stage 
     sum m (x1 - x) = 0,    sum m r0 x (x1 - x) = 0,    x1 = c1 + R r1,
 
 for positions x moved by all other forces, with arms r about the centre of mass: r0 at the start, r1 at the end
-but for the rotation R; they differ where a load moves over its deck. With R by a quaternion (q0, q) and the
-inertia J of the particles held by rods, the moment is
+but for the rotation R; they differ where a load moves over its deck. With R by the vector g = tan(angle / 2) times its
+axis, (R - 1) r = 2 (g x r + g x (g x r)) / (1 + g.g), and the inertia J of the particles held by rods, the moment is
 
-    q0 J q + q x J q + sum over loads of m/2 r0 x (R - 1) r1 = L/2,    L = sum m r0 x (x - c1 - r1),
+    J g + g x J g + sum over loads of m r0 x (g x r1 + g x (g x r1)) = (1 + g.g) L/2,    L = sum m r0 x (x - c1 - r1),
 
-three equations (Moser & Veselov 1991; ``cluster_turn``). Impulses follow from displacements, not from
+three equations of second degree, without a root (Moser & Veselov 1991; ``cluster_turn``). Impulses follow from displacements, not from
 places, so that rounding takes no momentum; places have the exact shape, which therefore cannot drift. The
 velocity stage gives all particles V + w x r, loads their motion over the deck besides.
 
@@ -61,7 +61,7 @@ from ..model.tape import (
     SHIFT,
     TURN,
 )
-from .cluster_turn import cluster_end, cluster_loads, turn, turn_root
+from .cluster_turn import cluster_end, cluster_loads, turn
 
 
 @inner
@@ -231,8 +231,7 @@ def _move_loads(tape, s, at, velocity):
             store_vector(s, own + MOTION, x, y, z)
         else:
             x, y, z = load_vector(s, own + ARM)
-            half = splat(0.5) * m
-            store_vector(s, own + BEFORE, half * (x + x0), half * (y + y0), half * (z + z0))
+            store_vector(s, own + BEFORE, m * (x + x0), m * (y + y0), m * (z + z0))
             x, y, z = _mean_arm(tape, s, rider, tape[rider + 1])
             x = x + x0
             y = y + y0
@@ -349,21 +348,21 @@ def _place(tape, s, at, target, count, finish):
     two = splat(2.0)
     work = tape[at + 7]
     x, y, z = load_vector(s, work + TURN)
-    root = turn_root(x, y, z)
     ux, uy, uz = load_vector(s, work + MEAN)
     dx, dy, dz = load_vector(s, work + DELTA)
     cx, cy, cz = load_vector(s, work + CENTRE)
-    # R - 1 = 2 (q0 [q] + q q^T - q.q).
-    square = -dot(x, y, z, x, y, z)
-    d00 = two * fma(x, x, square)
-    d11 = two * fma(y, y, square)
-    d22 = two * fma(z, z, square)
-    d01 = two * fma(x, y, -root * z)
-    d10 = two * fma(x, y, root * z)
-    d02 = two * fma(x, z, root * y)
-    d20 = two * fma(x, z, -root * y)
-    d12 = two * fma(y, z, -root * x)
-    d21 = two * fma(y, z, root * x)
+    # R - 1 = 2 ([g] + g g^T - g.g) / (1 + g.g).
+    square = dot(x, y, z, x, y, z)
+    share = two / (splat(1.0) + square)
+    d00 = share * fma(x, x, -square)
+    d11 = share * fma(y, y, -square)
+    d22 = share * fma(z, z, -square)
+    d01 = share * fma(x, y, -z)
+    d10 = share * fma(x, y, z)
+    d02 = share * fma(x, z, y)
+    d20 = share * fma(x, z, -y)
+    d12 = share * fma(y, z, -x)
+    d21 = share * fma(y, z, x)
     for k in range(count):
         entry = at + CLUSTER_HEAD + ENTRY * k
         p = tape[entry]
