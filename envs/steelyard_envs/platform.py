@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from typing import Any, ClassVar
 
-import numpy as np
-
 import steelyard as sy
 from steelyard_envs.clip import clip_lanes as clip
 from steelyard_envs.single import TaskEnv
@@ -197,9 +195,7 @@ def _observe(mask, values, layout, state, observations):
     worlds = mask.shape[0]
     for first in range(0, worlds, lanes.LANES):
         if mask[first : min(first + lanes.LANES, worlds)].any():
-            _observe_block(
-                first, layout[_POSITION], layout[_VELOCITY], values, state, observations
-            )
+            _observe_block(first, layout[_POSITION], layout[_VELOCITY], values, state, observations)
 
 
 @sy.inner

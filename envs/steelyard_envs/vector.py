@@ -74,7 +74,8 @@ class TaskVectorEnv(gym.vector.VectorEnv[Array, Array, Array]):
         self.single_action_space = self.task.action_space()
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
-        self._names = tuple(f"reward_{term}" for term in self.task.terms)
+        names = (*(f"reward_{term}" for term in self.task.terms), "is_success", "physics_error")
+        self._keys = (*names, *(f"_{name}" for name in names))
         self._done = np.zeros(self.num_envs, dtype=np.bool_)
         self._all = np.ones(self.num_envs, dtype=np.bool_)
         # Kernels get this one array: a read-only or strided one would make numba compile them anew.
@@ -174,8 +175,7 @@ class TaskVectorEnv(gym.vector.VectorEnv[Array, Array, Array]):
                 task.start(done)
         if self.render_mode == "human":
             self.render()
-        info = self._info() | info
-        return task.observations.copy(), reward, terminated, truncated, info
+        return task.observations.copy(), reward, terminated, truncated, self._info() | info
 
     def _final(self, done: Array) -> dict[str, Any]:
         """Last observations and infos of the finished rows, in Gymnasium's form."""
@@ -199,12 +199,10 @@ class TaskVectorEnv(gym.vector.VectorEnv[Array, Array, Array]):
         else:
             terms *= rows
             flags &= rows
-        info: dict[str, Any] = dict(zip(self._names, terms, strict=True))
-        info["is_success"] = flags[SUCCESS]
-        info["physics_error"] = flags[PHYSICS_ERROR]
-        present = np.empty((len(info), self.num_envs), dtype=np.bool_)
+        present = np.empty((len(self._keys) // 2, self.num_envs), dtype=np.bool_)
         present[:] = rows
-        return info | {f"_{name}": row for name, row in zip(info, present, strict=True)}
+        values = (*terms, flags[SUCCESS], flags[PHYSICS_ERROR], *present)
+        return dict(zip(self._keys, values, strict=True))
 
     def snapshot(self) -> tuple[Any, ...]:
         """Copy of the whole state, random streams included, for ``restore``."""

@@ -1,0 +1,57 @@
+"""Lane vectors of whole arrays, where a batch ends within a block and where it does not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import steelyard as sy
+
+lanes = sy.extension
+
+
+@sy.kernel
+def _through_rows(rows, out, above, limit):
+    for first in range(0, rows.shape[1], lanes.LANES):
+        value = lanes.load_row(rows, 1, first)
+        lanes.store_row(out, 2, first, value + value)
+        lanes.store_row(above, 1, first, value > lanes.splat(limit))
+
+
+@sy.kernel
+def _through_columns(table, out):
+    for first in range(0, table.shape[0], lanes.LANES):
+        lanes.store_column(out, first, 1, -lanes.load_column(table, first, 2))
+
+
+@sy.kernel
+def _sums_of_blocks(table, out):
+    for first in range(0, table.shape[0], lanes.LANES):
+        lanes.store_row(out, 0, first, lanes.load_column(table, first, 0))
+
+
+@pytest.mark.parametrize("worlds", [1, 5, 8, 13, 24])
+def test_rows_are_loaded_and_stored_to_their_end(worlds: int) -> None:
+    rows = np.random.default_rng(0).standard_normal((3, worlds))
+    out = np.zeros((4, worlds))
+    above = np.zeros((2, worlds), dtype=np.bool_)
+    _through_rows(rows, out, above, 0.1)
+    np.testing.assert_array_equal(out[2], 2.0 * rows[1])
+    np.testing.assert_array_equal(above[1], rows[1] > 0.1)
+    assert not out[[0, 1, 3]].any() and not above[0].any()
+
+
+@pytest.mark.parametrize("worlds", [1, 5, 8, 13, 24])
+def test_columns_are_loaded_and_stored_to_their_end(worlds: int) -> None:
+    table = np.random.default_rng(0).standard_normal((worlds, 3)).astype(np.float32)
+    out = np.zeros((worlds, 2), dtype=np.float32)
+    _through_columns(table, out)
+    np.testing.assert_array_equal(out[:, 1], -table[:, 2])
+    assert not out[:, 0].any()
+
+
+def test_what_is_behind_the_last_world_repeats_it() -> None:
+    table = np.arange(1.0, 11.0).astype(np.float32)[:, None].copy()
+    out = np.zeros((1, 16))
+    _sums_of_blocks(table, out)
+    assert out[0].tolist() == [*range(1, 11), *([10] * 6)]
