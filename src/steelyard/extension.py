@@ -13,8 +13,8 @@ A method is an ``Integrator`` in one file, beside those of ``integrators``.
 Stages are written in lane vectors (``math.lanes``), one number for each of eight worlds, on rows of the scratch that
 the tape names (``model.tape``). The file of any method shows how.
 
-Kernels of an environment loop over worlds. Where that takes as long as the physics, they can take eight at a time too, from
-whole arrays (``math.array_lanes``), as those of Platform do.
+Kernels of an environment loop over worlds. Where that takes long beside the physics, they can take eight at a time
+too, from whole arrays (``math.array_lanes``), as those of Platform do.
 """
 
 from .forces.accumulate import accumulate_forces

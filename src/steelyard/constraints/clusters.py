@@ -11,9 +11,9 @@ axis, (R - 1) r = 2 (g x r + g x (g x r)) / (1 + g.g), and the inertia J of the 
 
     J g + g x J g + sum over loads of m r0 x (g x r1 + g x (g x r1)) = (1 + g.g) L/2,    L = sum m r0 x (x - c1 - r1),
 
-three equations of second degree, without a root (Moser & Veselov 1991; ``cluster_turn``). Impulses follow from displacements, not from
-places, so that rounding takes no momentum; places have the exact shape, which therefore cannot drift. The
-velocity stage gives all particles V + w x r, loads their motion over the deck besides.
+three equations of second degree, without a root (Moser & Veselov 1991; ``cluster_turn``). Impulses follow from
+displacements, not from places, so that rounding takes no momentum; places have the exact shape, which therefore
+cannot drift. The velocity stage gives all particles V + w x r, loads their motion over the deck besides.
 
 Forces are summed into the mean displacement and the moment once a stage. What a pass adds to them are the impulses of
 contacts and links on the few particles that these touch; the others are placed when the stage ends.

@@ -147,7 +147,7 @@ KINK, KINK_ROWS = 4, 3
 BUNGEE, FLOAT_TOP, FLOAT_BOTTOM = range(3)
 
 # Records of clusters and of loads on them: what comes before their lists, and an entry of a cluster's. Work rows of a
-# cluster: inertia, inverse of that with loads, quaternion (angular velocity in the velocity stage), shift of the centre
+# cluster: inertia, inverse of that with loads, turn (angular velocity in the velocity stage), shift of the centre
 # by loads at the start and at the end, centre, mean motion and moment without impulses, mean motion, arms; of a load:
 # its arm, r0 and r1 of the moment's equation, motion over the deck.
 CLUSTER_HEAD, ENTRY, LOAD_HEAD = 11, 4, 5
