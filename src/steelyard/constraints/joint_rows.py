@@ -10,9 +10,11 @@ from __future__ import annotations
 from math import atan2, floor, pi, sqrt
 
 from ..kernel import inner
+from ..math.lanes import load_at
 from ..math.pointers import LANES, doubles_at
 from ..model.rigid_layout import (
     DRIVE,
+    DRIVE_ROWS,
     DRIVES_AT,
     EQUAL,
     FRAME_WORK,
@@ -42,14 +44,14 @@ from ..model.rigid_layout import (
     OFF,
     ROW_ENTRIES,
     ROW_WORK,
-    S_INVERSE,
-    S_INVERSE_INERTIA,
     S_MOVES,
     S_TURNS,
     SOLIDS,
     SPRING,
+    WIDE_ROW,
 )
-from .solids import solid_at, symmetric_times
+from .solids import solid_at
+from .wide_rows import finish_wide_row, velocity_along
 
 _HUGE = 1e300
 ERRORS, DIRECTIONS, ALL = range(3)
@@ -219,69 +221,75 @@ def measure_joint(tape, s, rigid, k, joint, place, turn, what):
     for i in range(tape[joint + JOINT_DRIVES]):
         drive = joint + DRIVES_AT + DRIVE * i
         c = tape[drive]
-        value = 0.0
-        for part in range(4):
-            if c == 3:
-                # Within half a turn of the middle of its limits, so that it does not jump from one to the other.
-                low = s[LANES * tape[drive + 3] + k]
-                high = s[LANES * tape[drive + 4] + k]
-                middle = 0.5 * (low + high) if low > -_HUGE and high < _HUGE else 0.0
-                value = _angle(s, row, frames, push)
-                value -= 2.0 * pi * floor((value - middle) / (2.0 * pi) + 0.5)
-            else:
-                value = _coordinate(s, row, frames, a + place, b + place, c, push)
-            if push:
-                _weigh_row(s, row, a, b)
+        low = s[LANES * tape[drive + 3] + k]
+        high = s[LANES * tape[drive + 4] + k]
+        # Its four rows push along one direction.
+        if c == 3:
+            # Within half a turn of the middle of its limits, so that it does not jump from one to the other.
+            middle = 0.5 * (low + high) if low > -_HUGE and high < _HUGE else 0.0
+            value = _angle(s, row, frames, push)
+            value -= 2.0 * pi * floor((value - middle) / (2.0 * pi) + 0.5)
+        else:
+            value = _coordinate(s, row, frames, a + place, b + place, c, push)
+        if push:
+            _weigh_row(s, row, a, b)
+        first = row
+        for part in range(DRIVE_ROWS):
+            if begin:
+                _begin_part(tape, s, k, drive, part, row, first, whole)
             if part == 0:
-                low = s[LANES * tape[drive + 3] + k]
                 s[row + J_ERROR] = value - low
-                if begin:
-                    _begin_row(s, row, LIMIT if whole and low > -_HUGE else OFF, 0.0, _HUGE)
             elif part == 1:
-                high = s[LANES * tape[drive + 4] + k]
                 s[row + J_ERROR] = value - high
-                if begin:
-                    _begin_row(s, row, LIMIT if whole and high < _HUGE else OFF, -_HUGE, 0.0)
             elif part == 2:
-                strength = s[LANES * tape[drive + 2] + k]
                 s[row + J_ERROR] = 0.0
-                if begin:
-                    _begin_row(
-                        s, row, MOTOR if whole and strength > 0.0 else OFF, -strength, strength
-                    )
-                    s[row + J_LEAST] = s[LANES * tape[drive + 1] + k]
             else:
                 s[row + J_ERROR] = value - s[LANES * tape[drive + 7] + k]
-                if begin:
-                    stiffness = s[LANES * tape[drive + 5] + k]
-                    damping = s[LANES * tape[drive + 6] + k]
-                    some = whole and (stiffness > 0.0 or damping > 0.0)
-                    _begin_row(s, row, SPRING if some else OFF, -_HUGE, _HUGE)
-                    s[row + J_STIFFNESS] = stiffness
-                    s[row + J_DAMPING] = damping
+            if push and part > 0 and s[row + J_KIND] != OFF:
+                _copy_direction(s, row, first)
             row += ROW_ENTRIES
 
 
 @inner
-def _mobility(s, row, solid, torque):
-    """What a unit impulse along a row does to the velocity along it, on one solid."""
-    a, b, c = symmetric_times(
-        s, solid + S_INVERSE_INERTIA, s[row + torque], s[row + torque + 1], s[row + torque + 2]
-    )
-    turning = a * s[row + torque] + b * s[row + torque + 1] + c * s[row + torque + 2]
-    x = s[row + J_FORCE]
-    y = s[row + J_FORCE + 1]
-    z = s[row + J_FORCE + 2]
-    return s[solid + S_INVERSE] * (x * x + y * y + z * z) + turning
+def _begin_part(tape, s, k, drive, part, row, first, whole):
+    """Kind and bounds of a drive's row: lower limit, upper limit, motor or spring."""
+    s[row + J_WEIGHT] = s[first + J_WEIGHT]
+    if part == 0:
+        some = whole and s[LANES * tape[drive + 3] + k] > -_HUGE
+        _begin_row(s, row, LIMIT if some else OFF, 0.0, _HUGE)
+    elif part == 1:
+        some = whole and s[LANES * tape[drive + 4] + k] < _HUGE
+        _begin_row(s, row, LIMIT if some else OFF, -_HUGE, 0.0)
+    elif part == 2:
+        strength = s[LANES * tape[drive + 2] + k]
+        some = whole and strength > 0.0
+        _begin_row(s, row, MOTOR if some else OFF, -strength, strength)
+        s[row + J_LEAST] = s[LANES * tape[drive + 1] + k]
+    else:
+        stiffness = s[LANES * tape[drive + 5] + k]
+        damping = s[LANES * tape[drive + 6] + k]
+        some = whole and (stiffness > 0.0 or damping > 0.0)
+        _begin_row(s, row, SPRING if some else OFF, -_HUGE, _HUGE)
+        s[row + J_STIFFNESS] = stiffness
+        s[row + J_DAMPING] = damping
 
 
 @inner
 def _weigh_row(s, row, a, b):
-    """Mobility of a row; torques on what does not turn are left out."""
+    """Make a row ready, and its mobility; torques on what does not turn are left out."""
     for i in range(3):
         s[row + J_TORQUE_A + i] *= s[a + S_TURNS]
         s[row + J_TORQUE_B + i] *= s[b + S_TURNS]
-    s[row + J_WEIGHT] = _mobility(s, row, a, J_TORQUE_A) + _mobility(s, row, b, J_TORQUE_B)
+    t = row + J_TORQUE_B
+    s[row + J_WEIGHT] = finish_wide_row(s, row, a, b, s[t], s[t + 1], s[t + 2])
+
+
+@inner
+def _copy_direction(s, row, other):
+    """Give a row the direction of another."""
+    for i in range(WIDE_ROW + 3):
+        s[row + i] = s[other + i]
+    s[row + J_WEIGHT] = s[other + J_WEIGHT]
 
 
 @inner
@@ -300,12 +308,7 @@ def _begin_row(s, row, kind, low, high):
 @inner
 def row_velocity(s, row, a, b, field):
     """Velocity along a row, by a six-vector of the solids."""
-    u = 0.0
-    for i in range(3):
-        u += s[row + J_FORCE + i] * (s[a + field + i] - s[b + field + i])
-        u += s[row + J_TORQUE_A + i] * s[a + field + 3 + i]
-        u -= s[row + J_TORQUE_B + i] * s[b + field + 3 + i]
-    return u
+    return velocity_along(s, row, load_at(s, a + field), load_at(s, b + field))
 
 
 @inner

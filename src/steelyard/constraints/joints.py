@@ -438,18 +438,22 @@ def store_joints(tape, s, rigid, k, dt, ends):
         ty = 0.0
         tz = 0.0
         for i in range(tape[joint + 5]):
-            value = s[row + J_OFFSET] + s[row + J_IMPULSE] if s[row + J_KIND] != OFF else 0.0
-            s[LANES * (tape[rigid + BOUND_ROW] + tape[joint + 4] + i) + k] = value
-            x = s[row + J_FORCE]
-            y = s[row + J_FORCE + 1]
-            z = s[row + J_FORCE + 2]
-            fx += value * x
-            fy += value * y
-            fz += value * z
-            if x == 0.0 and y == 0.0 and z == 0.0:
-                tx += value * s[row + J_TORQUE_A]
-                ty += value * s[row + J_TORQUE_A + 1]
-                tz += value * s[row + J_TORQUE_A + 2]
+            at = LANES * (tape[rigid + BOUND_ROW] + tape[joint + 4] + i) + k
+            if s[row + J_KIND] == OFF:
+                s[at] = 0.0
+            else:
+                value = s[row + J_OFFSET] + s[row + J_IMPULSE]
+                s[at] = value
+                x = s[row + J_FORCE]
+                y = s[row + J_FORCE + 1]
+                z = s[row + J_FORCE + 2]
+                fx += value * x
+                fy += value * y
+                fz += value * z
+                if x == 0.0 and y == 0.0 and z == 0.0:
+                    tx += value * s[row + J_TORQUE_A]
+                    ty += value * s[row + J_TORQUE_A + 1]
+                    tz += value * s[row + J_TORQUE_A + 2]
             row += ROW_ENTRIES
         if ends:
             share = 2.0 / dt

@@ -12,7 +12,6 @@ from ..kernel import inner
 from ..math.lanes import splat
 from ..math.pointers import LANES
 from ..model.rigid_layout import (
-    JOINTS,
     PACK_ROW,
     REST,
     REST_ROW,
@@ -157,20 +156,21 @@ def gather_solids(tape, s, rigid, k):
             for c in range(3):
                 s[at + S_FREE + 3 + c] = 0.0
         for c in range(6):
-            s[at + S_VELOCITY + c] = 0.0
             s[at + S_STEP + c] = 0.0
             s[at + S_GEOMETRIC + c] = 0.0
             s[at + S_BASE + c] = 0.0
             s[at + S_JOINED + c] = 0.0
+        # With what lies behind: a velocity is loaded with it, and a NaN of another world must not stay there.
+        for c in range(8):
+            s[at + S_VELOCITY + c] = 0.0
         record += SOLID
         at += SOLID_ENTRIES
-    if tape[rigid + JOINTS] > 0:
-        # One more: the world, to which joints may hold.
-        for c in range(SOLID_ENTRIES):
-            s[at + c] = 0.0
-        for c in range(3):
-            s[at + S_ROTATION + 4 * c] = 1.0
-            s[at + S_END_ROTATION + 4 * c] = 1.0
+    # One more: the world, to which joints may hold, and scenery belongs.
+    for c in range(SOLID_ENTRIES):
+        s[at + c] = 0.0
+    for c in range(3):
+        s[at + S_ROTATION + 4 * c] = 1.0
+        s[at + S_END_ROTATION + 4 * c] = 1.0
 
 
 @inner

@@ -222,6 +222,31 @@ def any_lane(typing_context: Any, condition: Any) -> Any:
     return types.boolean(mask), codegen
 
 
+@_operation
+def sum_lanes(typing_context: Any, a: Any) -> Any:
+    """Sum of all lanes, halves first: always in the same order."""
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        value, width = args[0], LANES
+        while width > 1:
+            width //= 2
+            undefined = ir.Constant(value.type, ir.Undefined)
+            halves = [
+                builder.shuffle_vector(
+                    value,
+                    undefined,
+                    ir.Constant(
+                        ir.VectorType(ir.IntType(32), width), list(range(first, first + width))
+                    ),
+                )
+                for first in (0, width)
+            ]
+            value = builder.fadd(*halves)
+        return builder.extract_element(value, ir.Constant(ir.IntType(32), 0))
+
+    return types.float64(lane), codegen
+
+
 #: numba finds these for integers too, but only after it has tried them for much else, a millisecond each time.
 _INDEX_ARITHMETIC = (operator.add, operator.sub, operator.mul)
 

@@ -95,7 +95,8 @@ C_SPINNING, C_ROLLING, C_LIMIT, C_BRAKE_BEFORE, C_BRAKE, C_BRAKE_SPEED, C_BRAKE_
     60,
 )
 C_BRAKE_WEIGHT, C_MOVED = 63, 64
-CONTACT_ENTRIES = 65
+# Of sweeps: inverse mobilities along the normal and across it, and three wide rows.
+C_STEP, C_WIDE, CONTACT_ENTRIES = 65, 72, 168
 
 # Numbers of a joint's end: place and axes in its solid. Entries of a row of a joint: direction of its force, of its
 # torques on a and b, wanted velocity, compliance, impulse of the last pass and of this one, bounds of it, velocity and
@@ -104,17 +105,31 @@ CONTACT_ENTRIES = 65
 JOINT_NUMBERS = 24
 #: Frames of both ends, and behind them the sums from which passes are mixed.
 FRAME_ENTRIES = 56
-J_FORCE, J_TORQUE_A, J_TORQUE_B, J_LEAST, J_COMPLIANCE, J_BEFORE, J_IMPULSE = 0, 3, 6, 9, 10, 11, 12
-J_LOW, J_HIGH = 13, 14
-J_SPEED, J_CHANGE, J_ERROR, J_KIND, J_WEIGHT, J_STIFFNESS, J_DAMPING = 15, 16, 17, 18, 19, 20, 21
+J_FORCE, J_TORQUE_A, J_TORQUE_B, J_LEAST, J_COMPLIANCE, J_BEFORE, J_IMPULSE = (
+    0,
+    3,
+    32,
+    35,
+    36,
+    37,
+    38,
+)
+J_LOW, J_HIGH = 39, 40
+J_SPEED, J_CHANGE, J_ERROR, J_KIND, J_WEIGHT, J_STIFFNESS, J_DAMPING = 41, 42, 43, 44, 45, 46, 47
 #: Passes of which rows remember what they asked for and left.
 REMEMBERED = 5
-J_ASKED, J_LEFT = 22, 22 + REMEMBERED
-J_KEPT, J_OFFSET = 32, 33
-ROW_ENTRIES = 34
+J_ASKED, J_LEFT = 48, 48 + REMEMBERED
+J_KEPT, J_OFFSET = 58, 59
+# Of sweeps: the inverse mobility; and if this row and the next two are solved together the inverse of theirs (six
+# numbers, the first of them 0 if not).
+J_STEP, J_BLOCK, ROW_ENTRIES = 60, 61, 72
 #: Rows of a drive: two limits, motor, spring.
 DRIVE_ROWS = 4
 OFF, EQUAL, LIMIT, MOTOR, SPRING = 0.0, 1.0, 2.0, 3.0, 4.0
+
+# A wide row (``constraints.wide_rows``), four times eight entries: its direction for solids a and b, and both times the
+# inverse of mass and inertia.
+W_B, W_MOVES_A, W_MOVES_B, WIDE_ROW = 8, 16, 24, 32
 
 # Rows of the state per contact: its id + 1, or 0 for none; impulse and place in the world; rebound; and the normal
 # impulse of the position stage on what was open, on which the velocity stage has friction; in scenes with friction of

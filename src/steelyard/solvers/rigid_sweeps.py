@@ -1,7 +1,8 @@
 """Sweeps over the contacts and joints of an island: one after the other, or the worst first.
 
 Impulses are summed per row and clamped as sums, friction to the disc that the normal impulse at hand allows. A row of
-compliance R moves by (wanted - u - R l)/(w + R), w what a unit impulse along it does to its velocity u.
+compliance R moves by (wanted - u - R l)/(w + R), w what a unit impulse along it does to its velocity u; three rows that
+hold a joint's place, or its turn, are solved together.
 """
 
 from __future__ import annotations
@@ -9,15 +10,17 @@ from __future__ import annotations
 from math import sqrt
 
 from ..constraints.brakes import brake_mobility, has_brake, limit_brake, relative_spin
-from ..constraints.contact_rows import (
-    contact_at,
-    contact_ends,
-    length,
-    relative_velocity,
-    world_vector,
+from ..constraints.contact_rows import contact_at, contact_ends, length, world_vector
+from ..constraints.joint_rows import joint_at, joint_solids, row_at
+from ..constraints.solids import solid_at, symmetric_times
+from ..constraints.wide_rows import (
+    finish_wide_row,
+    load_velocity,
+    moved,
+    response_along,
+    store_velocity,
+    velocity_along,
 )
-from ..constraints.joint_rows import joint_at, joint_solids, row_at, row_velocity
-from ..constraints.solids import symmetric_times
 from ..kernel import inner
 from ..math.pointers import doubles_at
 from ..model.rigid_layout import (
@@ -36,19 +39,21 @@ from ..model.rigid_layout import (
     C_LEAST,
     C_LIMIT,
     C_NORMAL,
+    C_STEP,
     C_TANGENT,
+    C_WIDE,
+    EQUAL,
     HELD,
     ISLAND,
     J_BEFORE,
+    J_BLOCK,
     J_COMPLIANCE,
-    J_FORCE,
     J_HIGH,
     J_IMPULSE,
     J_KIND,
     J_LEAST,
     J_LOW,
-    J_TORQUE_A,
-    J_TORQUE_B,
+    J_STEP,
     J_WEIGHT,
     LIST,
     N_SWEEPS,
@@ -60,6 +65,8 @@ from ..model.rigid_layout import (
     S_INVERSE_INERTIA,
     S_VELOCITY,
     SETTLED,
+    SOLIDS,
+    WIDE_ROW,
 )
 from ..model.tape import H_RIGID
 from ..stage import stage
@@ -67,6 +74,8 @@ from .rigid_islands import PUSH, begin_velocity, forget_impulses, island_at_hand
 
 # Sweeps of a single contact, and the change, over its impulse, at which it stands still.
 _SETTLING, _SETTLED = 40, 4e-16
+# Share of the product of their mobilities from which three rows count as independent.
+_APART = 1e-9
 
 
 @inner
@@ -91,74 +100,104 @@ def mobility_along(s, c, solid, arm, direction):
 
 
 @inner
-def _mobility_across(s, c, solid, arm):
-    """What a unit impulse along one tangent does to the velocity along the other."""
-    x, y, z = _moment(s, c, arm, C_TANGENT)
-    a, b, d = symmetric_times(s, solid + S_INVERSE_INERTIA, x, y, z)
-    x, y, z = _moment(s, c, arm, C_BINORMAL)
-    return a * x + b * y + d * z
+def _turn(s, solid, x, y, z):
+    """Change a solid's angular velocity by a couple."""
+    a, b, c = symmetric_times(s, solid + S_INVERSE_INERTIA, x, y, z)
+    v = solid + S_VELOCITY + 3
+    s[v] += a
+    s[v + 1] += b
+    s[v + 2] += c
 
 
 @inner
-def _move(s, solid, fx, fy, fz, tx, ty, tz):
-    """Change a solid's velocities by an impulse and its moment."""
-    v = solid + S_VELOCITY
-    inverse = s[solid + S_INVERSE]
-    s[v] += inverse * fx
-    s[v + 1] += inverse * fy
-    s[v + 2] += inverse * fz
-    a, b, c = symmetric_times(s, solid + S_INVERSE_INERTIA, tx, ty, tz)
-    s[v + 3] += a
-    s[v + 4] += b
-    s[v + 5] += c
+def _other(tape, rigid, b):
+    """The second solid of a contact: of scenery the world, which stands still."""
+    return b if b >= 0 else solid_at(tape, rigid, tape[rigid + SOLIDS])
 
 
 @inner
-def _push(s, c, a, b, n, t, u):
-    """Change the velocities of both solids by an impulse along normal and tangents."""
-    fx, fy, fz = world_vector(s, c, n, t, u)
-    x = s[c + C_ARM_A]
-    y = s[c + C_ARM_A + 1]
-    z = s[c + C_ARM_A + 2]
-    _move(s, a, fx, fy, fz, y * fz - z * fy, z * fx - x * fz, x * fy - y * fx)
-    if b >= 0:
-        x = s[c + C_ARM_B]
-        y = s[c + C_ARM_B + 1]
-        z = s[c + C_ARM_B + 2]
-        _move(s, b, -fx, -fy, -fz, z * fy - y * fz, x * fz - z * fx, y * fx - x * fy)
+def _begin_contact(s, c, a, b, has_b):
+    """Impulses of the stage before, rows and mobilities of a contact."""
+    for k in range(3):
+        s[c + C_IMPULSE + k] = s[c + C_BEFORE + k]
+        direction = C_NORMAL if k == 0 else (C_TANGENT if k == 1 else C_BINORMAL)
+        ax, ay, az = _moment(s, c, C_ARM_A, direction)
+        bx, by, bz = 0.0, 0.0, 0.0
+        if has_b:
+            bx, by, bz = _moment(s, c, C_ARM_B, direction)
+        wide = c + C_WIDE + WIDE_ROW * k
+        for i in range(3):
+            s[wide + i] = s[c + direction + i]
+        s[wide + 3] = ax
+        s[wide + 4] = ay
+        s[wide + 5] = az
+        s[c + C_DERIVATIVE + k] = finish_wide_row(s, wide, a, b, bx, by, bz)
+    across = response_along(s, c + C_WIDE + WIDE_ROW, c + C_WIDE + 2 * WIDE_ROW)
+    # One for both tangents, the largest in their plane: with one each, friction would not be along the slip.
+    mean = 0.5 * (s[c + C_DERIVATIVE + 1] + s[c + C_DERIVATIVE + 2])
+    half = 0.5 * (s[c + C_DERIVATIVE + 1] - s[c + C_DERIVATIVE + 2])
+    s[c + C_DERIVATIVE + 1] = mean + sqrt(half * half + across * across)
+    # So far over the mobility.
+    s[c + C_COMPLIANCE] *= s[c + C_DERIVATIVE]
+    s[c + C_STEP] = 1.0 / (s[c + C_DERIVATIVE] + s[c + C_COMPLIANCE])
+    s[c + C_STEP + 1] = 1.0 / s[c + C_DERIVATIVE + 1]
+
+
+@inner
+def _begin_block(s, row):
+    """Inverse of what unit impulses along three rows that are held do to each other, if they can be solved together."""
+    second = row + ROW_ENTRIES
+    third = second + ROW_ENTRIES
+    s[row + J_BLOCK] = 0.0
+    if s[row + J_KIND] == EQUAL and s[second + J_KIND] == EQUAL and s[third + J_KIND] == EQUAL:
+        xx = s[row + J_WEIGHT] + s[row + J_COMPLIANCE]
+        yy = s[second + J_WEIGHT] + s[second + J_COMPLIANCE]
+        zz = s[third + J_WEIGHT] + s[third + J_COMPLIANCE]
+        yx = response_along(s, row, second)
+        zx = response_along(s, row, third)
+        zy = response_along(s, second, third)
+        cxx = yy * zz - zy * zy
+        cyx = zy * zx - yx * zz
+        czx = yx * zy - yy * zx
+        determinant = xx * cxx + yx * cyx + zx * czx
+        if determinant > _APART * xx * yy * zz:
+            share = 1.0 / determinant
+            s[row + J_BLOCK] = share * cxx
+            s[row + J_BLOCK + 1] = share * cyx
+            s[row + J_BLOCK + 2] = share * (xx * zz - zx * zx)
+            s[row + J_BLOCK + 3] = share * czx
+            s[row + J_BLOCK + 4] = share * (yx * zx - xx * zy)
+            s[row + J_BLOCK + 5] = share * (xx * yy - yx * yx)
+
+
+@inner
+def _begin_joint(tape, s, rigid, joint):
+    """Impulses of the stage before, and which neighbours of a joint's rows are solved together."""
+    first = row_at(tape, rigid, tape[joint + 4])
+    count = tape[joint + 5]
+    row = first
+    for _ in range(count):
+        s[row + J_IMPULSE] = s[row + J_BEFORE]
+        s[row + J_BLOCK] = 0.0
+        if s[row + J_KIND] != OFF:
+            s[row + J_STEP] = 1.0 / (s[row + J_WEIGHT] + s[row + J_COMPLIANCE])
+        row += ROW_ENTRIES
+    for k in range(0, count - 2, 3):
+        _begin_block(s, first + ROW_ENTRIES * k)
 
 
 @inner
 def _begin(tape, s, n, rigid, contacts, joints):
-    """Impulses of the stage before, and mobilities."""
+    """Impulses of the stage before, and rows."""
     for j in range(contacts):
         i = n[tape[rigid + LIST] + j]
         c = contact_at(tape, rigid, i)
         a, b = contact_ends(tape, n, rigid, i)
-        for k in range(3):
-            s[c + C_IMPULSE + k] = s[c + C_BEFORE + k]
-            direction = C_NORMAL if k == 0 else (C_TANGENT if k == 1 else C_BINORMAL)
-            mobility = mobility_along(s, c, a, C_ARM_A, direction)
-            if b >= 0:
-                mobility += mobility_along(s, c, b, C_ARM_B, direction)
-            s[c + C_DERIVATIVE + k] = mobility
-        across = _mobility_across(s, c, a, C_ARM_A)
-        if b >= 0:
-            across += _mobility_across(s, c, b, C_ARM_B)
-        # One for both tangents, the largest in their plane: with one each, friction would not be along the slip.
-        mean = 0.5 * (s[c + C_DERIVATIVE + 1] + s[c + C_DERIVATIVE + 2])
-        half = 0.5 * (s[c + C_DERIVATIVE + 1] - s[c + C_DERIVATIVE + 2])
-        s[c + C_DERIVATIVE + 1] = mean + sqrt(half * half + across * across)
-        # So far over the mobility.
-        s[c + C_COMPLIANCE] *= s[c + C_DERIVATIVE]
+        _begin_contact(s, c, a, _other(tape, rigid, b), b >= 0)
         if has_brake(s, c):
             _begin_brake(s, c, a, b)
     for j in range(joints):
-        joint = joint_at(tape, rigid, n[tape[rigid + HELD] + j])
-        row = row_at(tape, rigid, tape[joint + 4])
-        for _ in range(tape[joint + 5]):
-            s[row + J_IMPULSE] = s[row + J_BEFORE]
-            row += ROW_ENTRIES
+        _begin_joint(tape, s, rigid, joint_at(tape, rigid, n[tape[rigid + HELD] + j]))
 
 
 @inner
@@ -186,35 +225,36 @@ def _sweep_brake(s, c, a, b):
     s[c + C_BRAKE + 1] = l1
     s[c + C_BRAKE + 2] = l2
     x, y, z = world_vector(s, c, l0 - n, l1 - t, l2 - u)
-    _move(s, a, 0.0, 0.0, 0.0, x, y, z)
+    _turn(s, a, x, y, z)
     if b >= 0:
-        _move(s, b, 0.0, 0.0, 0.0, -x, -y, -z)
+        _turn(s, b, -x, -y, -z)
 
 
 @inner
-def _normal_change(s, c, u):
-    """Change of a contact's normal impulse at a normal velocity."""
-    give = s[c + C_COMPLIANCE]
+def _normal_change(s, c, va, vb):
+    """Change of a contact's normal impulse at the velocities of its solids."""
     before = s[c + C_IMPULSE]
-    after = before + (s[c + C_LEAST] - u - give * before) / (s[c + C_DERIVATIVE] + give)
+    rest = before + s[c + C_STEP] * (s[c + C_LEAST] - s[c + C_COMPLIANCE] * before)
+    after = rest - s[c + C_STEP] * velocity_along(s, c + C_WIDE, va, vb)
     return max(after, 0.0) - before
 
 
 @inner
-def _sweep_contact(s, c, a, b):
-    """Normal impulse, then friction, of one contact."""
-    u0, _, _ = relative_velocity(s, c, a, b, S_VELOCITY)
-    change = _normal_change(s, c, u0)
-    if change != 0.0:
-        s[c + C_IMPULSE] += change
-        _push(s, c, a, b, change, 0.0, 0.0)
+def _sweep_contact(s, c, a, b, brake_b):
+    """Normal impulse, then friction, of one contact; of spinning and rolling with ``brake_b``, -1 for scenery."""
+    va = load_velocity(s, a)
+    vb = load_velocity(s, b)
+    change = _normal_change(s, c, va, vb)
+    s[c + C_IMPULSE] += change
+    va, vb = moved(s, c + C_WIDE, va, vb, change)
     most = s[c + C_FRICTION] * (s[c + C_IMPULSE] + s[c + C_HELD])
     l1 = s[c + C_IMPULSE + 1]
     l2 = s[c + C_IMPULSE + 2]
     if most > 0.0 or l1 != 0.0 or l2 != 0.0:
-        _, u1, u2 = relative_velocity(s, c, a, b, S_VELOCITY)
-        t1 = l1 - u1 / s[c + C_DERIVATIVE + 1]
-        t2 = l2 - u2 / s[c + C_DERIVATIVE + 1]
+        first = c + C_WIDE + WIDE_ROW
+        second = first + WIDE_ROW
+        t1 = l1 - s[c + C_STEP + 1] * velocity_along(s, first, va, vb)
+        t2 = l2 - s[c + C_STEP + 1] * velocity_along(s, second, va, vb)
         size = sqrt(t1 * t1 + t2 * t2)
         if size > most:
             share = most / size
@@ -222,33 +262,60 @@ def _sweep_contact(s, c, a, b):
             t2 *= share
         s[c + C_IMPULSE + 1] = t1
         s[c + C_IMPULSE + 2] = t2
-        _push(s, c, a, b, 0.0, t1 - l1, t2 - l2)
+        va, vb = moved(s, first, va, vb, t1 - l1)
+        va, vb = moved(s, second, va, vb, t2 - l2)
+    store_velocity(s, a, va)
+    store_velocity(s, b, vb)
     if has_brake(s, c):
-        _sweep_brake(s, c, a, b)
+        _sweep_brake(s, c, a, brake_b)
 
 
 @inner
-def _row_change(s, row, a, b):
+def _row_change(s, row, va, vb):
     """Change of the impulse along a joint's row."""
-    u = row_velocity(s, row, a, b, S_VELOCITY)
-    give = s[row + J_COMPLIANCE]
     before = s[row + J_IMPULSE]
-    after = before + (s[row + J_LEAST] - u - give * before) / (s[row + J_WEIGHT] + give)
+    rest = before + s[row + J_STEP] * (s[row + J_LEAST] - s[row + J_COMPLIANCE] * before)
+    after = rest - s[row + J_STEP] * velocity_along(s, row, va, vb)
     return min(max(after, s[row + J_LOW]), s[row + J_HIGH]) - before
 
 
 @inner
 def _sweep_row(s, row, a, b):
     """One row of a joint."""
-    change = _row_change(s, row, a, b)
+    va = load_velocity(s, a)
+    vb = load_velocity(s, b)
+    change = _row_change(s, row, va, vb)
     s[row + J_IMPULSE] += change
-    fx = change * s[row + J_FORCE]
-    fy = change * s[row + J_FORCE + 1]
-    fz = change * s[row + J_FORCE + 2]
-    t = row + J_TORQUE_A
-    _move(s, a, fx, fy, fz, change * s[t], change * s[t + 1], change * s[t + 2])
-    t = row + J_TORQUE_B
-    _move(s, b, -fx, -fy, -fz, -change * s[t], -change * s[t + 1], -change * s[t + 2])
+    va, vb = moved(s, row, va, vb, change)
+    store_velocity(s, a, va)
+    store_velocity(s, b, vb)
+
+
+@inner
+def _missing(s, row, va, vb):
+    """Velocity along a row that is held which is still wanted."""
+    held = s[row + J_COMPLIANCE] * s[row + J_IMPULSE]
+    return s[row + J_LEAST] - held - velocity_along(s, row, va, vb)
+
+
+@inner
+def _sweep_block(s, row, a, b):
+    """Three rows of a joint that are held, at once."""
+    second = row + ROW_ENTRIES
+    third = second + ROW_ENTRIES
+    va = load_velocity(s, a)
+    vb = load_velocity(s, b)
+    x, y, z = symmetric_times(
+        s, row + J_BLOCK, _missing(s, row, va, vb), _missing(s, second, va, vb), _missing(s, third, va, vb)
+    )  # fmt: skip
+    s[row + J_IMPULSE] += x
+    s[second + J_IMPULSE] += y
+    s[third + J_IMPULSE] += z
+    va, vb = moved(s, row, va, vb, x)
+    va, vb = moved(s, second, va, vb, y)
+    va, vb = moved(s, third, va, vb, z)
+    store_velocity(s, a, va)
+    store_velocity(s, b, vb)
 
 
 @inner
@@ -258,14 +325,18 @@ def _sweep(tape, s, n, rigid, contacts, joints):
         joint = joint_at(tape, rigid, n[tape[rigid + HELD] + j])
         a, b = joint_solids(tape, rigid, joint)
         row = row_at(tape, rigid, tape[joint + 4])
-        for _ in range(tape[joint + 5]):
-            if s[row + J_KIND] != OFF:
+        end = row + ROW_ENTRIES * tape[joint + 5]
+        while row < end:
+            if s[row + J_BLOCK] != 0.0:
+                _sweep_block(s, row, a, b)
+                row += 2 * ROW_ENTRIES
+            elif s[row + J_KIND] != OFF:
                 _sweep_row(s, row, a, b)
             row += ROW_ENTRIES
     for j in range(contacts):
         i = n[tape[rigid + LIST] + j]
         a, b = contact_ends(tape, n, rigid, i)
-        _sweep_contact(s, contact_at(tape, rigid, i), a, b)
+        _sweep_contact(s, contact_at(tape, rigid, i), a, _other(tape, rigid, b), b)
 
 
 @inner
@@ -280,7 +351,8 @@ def _mend_worst(tape, s, n, rigid, contacts, joints):
         row = row_at(tape, rigid, tape[joint + 4])
         for _ in range(tape[joint + 5]):
             if s[row + J_KIND] != OFF:
-                off = abs(_row_change(s, row, a, b)) * s[row + J_WEIGHT]
+                change = _row_change(s, row, load_velocity(s, a), load_velocity(s, b))
+                off = abs(change) * s[row + J_WEIGHT]
                 if off > worst:
                     worst = off
                     found = n[tape[rigid + HELD] + j]
@@ -291,14 +363,15 @@ def _mend_worst(tape, s, n, rigid, contacts, joints):
         i = n[tape[rigid + LIST] + j]
         c = contact_at(tape, rigid, i)
         a, b = contact_ends(tape, n, rigid, i)
-        u0, _, _ = relative_velocity(s, c, a, b, S_VELOCITY)
-        off = abs(_normal_change(s, c, u0)) * s[c + C_DERIVATIVE]
+        b = _other(tape, rigid, b)
+        change = _normal_change(s, c, load_velocity(s, a), load_velocity(s, b))
+        off = abs(change) * s[c + C_DERIVATIVE]
         if off > worst:
             worst = off
             contact = i
     if contact >= 0:
         a, b = contact_ends(tape, n, rigid, contact)
-        _sweep_contact(s, contact_at(tape, rigid, contact), a, b)
+        _sweep_contact(s, contact_at(tape, rigid, contact), a, _other(tape, rigid, b), b)
     elif found >= 0:
         a, b = joint_solids(tape, rigid, joint_at(tape, rigid, found))
         _sweep_row(s, found_row, a, b)
@@ -316,7 +389,7 @@ def settle_contact(tape, s, n, rigid):
     for _ in range(_SETTLING):
         l0, l1, l2 = s[c + C_IMPULSE], s[c + C_IMPULSE + 1], s[c + C_IMPULSE + 2]
         b0, b1, b2 = s[c + C_BRAKE], s[c + C_BRAKE + 1], s[c + C_BRAKE + 2]
-        _sweep_contact(s, c, a, b)
+        _sweep_contact(s, c, a, _other(tape, rigid, b), b)
         change = length(s[c + C_IMPULSE] - l0, s[c + C_IMPULSE + 1] - l1, s[c + C_IMPULSE + 2] - l2)
         size = length(s[c + C_IMPULSE], s[c + C_IMPULSE + 1], s[c + C_IMPULSE + 2])
         t = c + C_BRAKE
