@@ -95,7 +95,6 @@ def _turn_inertia(s, row, out, ex, ey, ez, fx, fy, fz, nx, ny, nz):
 @inner
 def _add_point(s, row, m, x, y, z):
     """Add the inertia of a mass at an arm to a matrix in six rows."""
-    splat(0.0)
     mx = m * x
     my = m * y
     mz = m * z
@@ -344,7 +343,6 @@ def _place(tape, s, at, target, count, finish):
 
     To ``finish``, their impulse rows become those of the whole motion.
     """
-    splat(0.0)
     two = splat(2.0)
     work = tape[at + 7]
     x, y, z = load_vector(s, work + TURN)

@@ -20,7 +20,6 @@ DECK = 4
 @inner
 def rider_offset(s, tape, rider, component):
     """x - sum of w_i x_i, one component."""
-    splat(0.0)
     weights = tape[rider + 7]
     value = load(s, tape[rider] + component)
     for k in range(tape[rider + 6]):
@@ -32,7 +31,6 @@ def rider_offset(s, tape, rider, component):
 @inner
 def rider_slip(s, tape, rider, component):
     """v - sum of (w_i v_i + dw_i/dt x_i), one component."""
-    splat(0.0)
     weights = tape[rider + 7]
     rates = tape[rider + 8]
     value = load(s, tape[rider + 1] + component)

@@ -79,7 +79,6 @@ def rotate(factor, w, x, y, z, a, b, c):
 @inner
 def rotate_back(factor, w, x, y, z, a, b, c):
     """The vector (a, b, c) from the world's frame to the body's."""
-    splat(0.0)
     return rotate(factor, w, -x, -y, -z, a, b, c)
 
 

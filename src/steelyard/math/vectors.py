@@ -59,7 +59,6 @@ def dot(ax, ay, az, bx, by, bz):
 @inner
 def cross(ax, ay, az, bx, by, bz):
     """Vector product."""
-    splat(0.0)
     return (
         fma(ay, bz, -az * by),
         fma(az, bx, -ax * bz),
@@ -98,7 +97,6 @@ def _reciprocal(value):
 @inner
 def symmetric_inverse(s, row, out):
     """Inverse of a symmetric matrix in six rows, into six others."""
-    splat(0.0)
     a = load(s, row)
     b = load(s, row + 1)
     c = load(s, row + 2)

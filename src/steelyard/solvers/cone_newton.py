@@ -144,7 +144,6 @@ def _contact_system(tape, s, skip, contact, k, velocity, first, width, softness,
 @inner
 def _eliminate(s, dense, count):
     """Solve the dense system in place by blocks of three, last column the right side."""
-    splat(0.0)
     size = 3 * count
     width = size + 1
     for k in range(count):

@@ -101,7 +101,6 @@ class Direct(Solver):
 @inner
 def _contact_rows(tape, s, skip, velocity):
     """Right-hand sides of the contacts: minus the relative motion still unwanted."""
-    splat(0.0)
     at = tape[H_CONTACTS]
     for index in range(tape[at]):
         contact = at + 1 + CONTACT * index

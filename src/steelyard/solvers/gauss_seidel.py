@@ -112,7 +112,6 @@ def _sweep_links(tape, s, velocity):
 @inner
 def sweep_riders(tape, s, velocity):
     """One sweep over the riders."""
-    splat(0.0)
     at = tape[H_RIDERS] + 1
     for _ in range(tape[tape[H_RIDERS]]):
         count = tape[at + 6]

@@ -205,7 +205,6 @@ def _add_columns(h, row, t0, t1, t2, x, y, z, moves, sign):
     x = splat(sign * x)
     y = splat(sign * y)
     z = splat(sign * z)
-    splat(0.0)
     store(h, row + 3, fma(y, t2, fma(-z, t1, load(h, row + 3))))
     store(h, row + 4, fma(z, t0, fma(-x, t2, load(h, row + 4))))
     store(h, row + 5, fma(x, t1, fma(-y, t0, load(h, row + 5))))

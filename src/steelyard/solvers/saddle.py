@@ -67,7 +67,6 @@ def _masses(tape, s, rate):
 @inner
 def _links(tape, s, square):
     """Rows of J and the geometric stiffness, times ``square``."""
-    splat(0.0)
     at = tape[H_LINKS]
     for index in range(tape[at]):
         link = at + 1 + LINK * index

@@ -29,7 +29,6 @@ _PIVOT = 1e-13
 @inner
 def _subtract_runs(tape, at, count, s, value):
     """Value less the sum of the products of the runs at ``at``."""
-    splat(0.0)
     for run in range(count):
         left = tape[at + 3 * run]
         right = tape[at + 3 * run + 1]
