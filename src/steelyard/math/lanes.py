@@ -223,6 +223,16 @@ def any_lane(typing_context: Any, condition: Any) -> Any:
 
 
 @_operation
+def one_lane(typing_context: Any, a: Any, index: Any) -> Any:
+    """The number in a lane, which is known when a kernel is compiled or costs a walk through memory."""
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return builder.extract_element(args[0], args[1])
+
+    return types.float64(lane, types.int64), codegen
+
+
+@_operation
 def sum_lanes(typing_context: Any, a: Any) -> Any:
     """Sum of all lanes, halves first: always in the same order."""
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 from math import sqrt
 
 from ..kernel import inner
-from ..math.lanes import fma, load, splat, store
+from ..math.lanes import fma, load, one_lane, splat, store
 
 #: Rows of a block.
 SIX = 6
@@ -62,20 +62,57 @@ def _store_block(h, row, c0, c1, c2, c3, c4, c5):
 
 
 @inner
-def _factorise_diagonal(h, row):
-    """Cholesky factor of one block; whether its pivots are above 0."""
-    good = True
-    for c in range(SIX):
-        column = load(h, row + c)
-        for d in range(c):
-            column = fma(splat(-h[row + d, c]), load(h, row + d), column)
-        store(h, row + c, column)
-        pivot = h[row + c, c]
-        good = good and pivot > 0.0
-        inverse = 1.0 / sqrt(pivot)
-        store(h, row + c, column * splat(inverse))
-        h[row + c, INVERSE] = inverse
-    return good
+def _finish_column(h, row, column, pivot):
+    """Store a column of the factor, and one over its pivot."""
+    inverse = 1.0 / sqrt(pivot)
+    store(h, row, column * splat(inverse))
+    h[row, INVERSE] = inverse
+
+
+@inner
+def _factorise_diagonal(h, row, c0, c1, c2, c3, c4, c5):
+    """Cholesky factor of a block of six columns; whether its pivots are above 0.
+
+    Columns are taken out by those over their pivots, so that no root stands in the way of the next.
+    """
+    pivot = one_lane(c0, 0)
+    good = pivot > 0.0
+    _finish_column(h, row, c0, pivot)
+    over = c0 * splat(1.0 / pivot)
+    c1 = fma(splat(-one_lane(c0, 1)), over, c1)
+    c2 = fma(splat(-one_lane(c0, 2)), over, c2)
+    c3 = fma(splat(-one_lane(c0, 3)), over, c3)
+    c4 = fma(splat(-one_lane(c0, 4)), over, c4)
+    c5 = fma(splat(-one_lane(c0, 5)), over, c5)
+    pivot = one_lane(c1, 1)
+    good = good and pivot > 0.0
+    _finish_column(h, row + 1, c1, pivot)
+    over = c1 * splat(1.0 / pivot)
+    c2 = fma(splat(-one_lane(c1, 2)), over, c2)
+    c3 = fma(splat(-one_lane(c1, 3)), over, c3)
+    c4 = fma(splat(-one_lane(c1, 4)), over, c4)
+    c5 = fma(splat(-one_lane(c1, 5)), over, c5)
+    pivot = one_lane(c2, 2)
+    good = good and pivot > 0.0
+    _finish_column(h, row + 2, c2, pivot)
+    over = c2 * splat(1.0 / pivot)
+    c3 = fma(splat(-one_lane(c2, 3)), over, c3)
+    c4 = fma(splat(-one_lane(c2, 4)), over, c4)
+    c5 = fma(splat(-one_lane(c2, 5)), over, c5)
+    pivot = one_lane(c3, 3)
+    good = good and pivot > 0.0
+    _finish_column(h, row + 3, c3, pivot)
+    over = c3 * splat(1.0 / pivot)
+    c4 = fma(splat(-one_lane(c3, 4)), over, c4)
+    c5 = fma(splat(-one_lane(c3, 5)), over, c5)
+    pivot = one_lane(c4, 4)
+    good = good and pivot > 0.0
+    _finish_column(h, row + 4, c4, pivot)
+    over = c4 * splat(1.0 / pivot)
+    c5 = fma(splat(-one_lane(c4, 5)), over, c5)
+    pivot = one_lane(c5, 5)
+    _finish_column(h, row + 5, c5, pivot)
+    return good and pivot > 0.0
 
 
 @inner
@@ -144,8 +181,7 @@ def factorise(h, n, first, start, blocks):
         for k in range(fi, i):
             row = own + SIX * (k - fi)
             c0, c1, c2, c3, c4, c5 = _less_product(h, row, row, c0, c1, c2, c3, c4, c5)
-        _store_block(h, diagonal, c0, c1, c2, c3, c4, c5)
-        good = _factorise_diagonal(h, diagonal) and good
+        good = _factorise_diagonal(h, diagonal, c0, c1, c2, c3, c4, c5) and good
     return good
 
 
