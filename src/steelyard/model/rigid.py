@@ -363,7 +363,9 @@ class Rigid:
         words[at.CONTACT_WORK] = entries(at.CONTACT_ENTRIES * capacity)
         words[at.POINTS_WORK] = entries(POINT * ALL_POINTS)
         words[at.NARROW_WORK] = entries(WORK)
-        words[at.MATRIX_ROW] = c.take(SIX * (solids * (solids + 1) // 2))
+        blocks = SIX * (solids * (solids + 1) // 2)
+        words[at.MATRIX_ROW] = c.take(blocks)
+        words[at.HELD_ROW] = c.take(blocks if self.joints else 0)
         words[at.VECTOR_ROW] = c.take(solids + 8)
         place = 0
         bonds = capacity + len(self.joints)

@@ -57,7 +57,7 @@ from .rigid_islands import (
     forget_impulses,
     island_at_hand,
 )
-from .rigid_newton import impulse_at, minimise
+from .rigid_newton import assemble_held, impulse_at, minimise
 from .rigid_sweeps import settle_contact
 
 # Compliance of the fallback, which is solved once, and of the push, over the mobility of a contact.
@@ -187,6 +187,7 @@ def _pass(tape, s, n, rigid, size, contacts, joints, rows, what):
         c = contact_at(tape, rigid, n[tape[rigid + LIST]])
         s[c + C_COMPLIANCE] = numbers[N_COMPLIANCE] * s[c + C_WEIGHT]
         begin_velocity(tape, s, n, rigid, size, contacts, joints, True)
+    assemble_held(tape, s, n, rigid, size, joints, rows)
     moved = False
     settled = False
     near = True
@@ -250,6 +251,7 @@ def _pass_softly(tape, s, n, rigid, size, contacts, joints, rows, compliance):
     numbers = doubles_at(tape[rigid + NUMBERS])
     forget_impulses(tape, s, n, rigid, contacts, joints, compliance)
     begin_velocity(tape, s, n, rigid, size, contacts, joints, False)
+    assemble_held(tape, s, n, rigid, size, joints, rows)
     few = int(numbers[N_ITERATIONS])
     loose = 10.0 * numbers[N_TOLERANCE]
     taken = minimise(tape, s, n, rigid, size, contacts, joints, rows, loose, 2 * few)

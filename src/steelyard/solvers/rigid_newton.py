@@ -25,7 +25,7 @@ from ..constraints.joint_rows import (
 )
 from ..constraints.solids import is_free, solid_at, symmetric_times
 from ..kernel import inner
-from ..math.lanes import fma, load, splat, store
+from ..math.lanes import fma, load, load_at, splat, store
 from ..math.pointers import LANES, offset
 from ..model.rigid_layout import (
     C_ARM_A,
@@ -48,16 +48,15 @@ from ..model.rigid_layout import (
     C_TANGENT,
     END_A,
     END_B,
+    EQUAL,
     FIRST,
     HELD,
+    HELD_ROW,
     J_CHANGE,
     J_COMPLIANCE,
-    J_FORCE,
     J_IMPULSE,
     J_KIND,
     J_SPEED,
-    J_TORQUE_A,
-    J_TORQUE_B,
     LIST,
     LOCAL,
     MATRIX_ROW,
@@ -78,6 +77,7 @@ from ..model.rigid_layout import (
     S_VELOCITY,
     STARTS,
     VECTOR_ROW,
+    W_B,
 )
 from .block_cholesky import SIX, clear_rows, factorise, solve_factored
 from .friction_cone import project_beyond, projection_derivative
@@ -256,10 +256,8 @@ def _stiffness(s, h, c, row):
 
 
 @inner
-def _assemble(tape, s, h, n, rigid, size, contacts, joints, rows):
-    """Newton's matrix in the rows of the factor."""
-    matrix = tape[rigid + MATRIX_ROW]
-    work = tape[rigid + VECTOR_ROW] + size + 1
+def _put_masses(tape, s, h, n, rigid, size, matrix, rows):
+    """A matrix with masses and inertias alone."""
     clear_rows(h, matrix, matrix + rows)
     for i in range(size):
         at = solid_at(tape, rigid, n[tape[rigid + ORDER] + i])
@@ -272,6 +270,31 @@ def _assemble(tape, s, h, n, rigid, size, contacts, joints, rows):
                 h[row + 3 + k, 3 + j] = s[entry]
                 h[row + 3 + j, 3 + k] = s[entry]
                 entry += 1
+
+
+@inner
+def assemble_held(tape, s, n, rigid, size, joints, rows):
+    """What all of an island's passes have in their matrices: masses, inertias, and the coordinates that joints lock."""
+    if joints > 0:
+        h = offset(s, 0)
+        held = tape[rigid + HELD_ROW]
+        work = tape[rigid + VECTOR_ROW] + size + 1
+        _put_masses(tape, s, h, n, rigid, size, held, rows)
+        for j in range(joints):
+            _assemble_joint(tape, s, h, n, rigid, n[tape[rigid + HELD] + j], held, work, True)
+
+
+@inner
+def _assemble(tape, s, h, n, rigid, size, contacts, joints, rows):
+    """Newton's matrix in the rows of the factor."""
+    matrix = tape[rigid + MATRIX_ROW]
+    work = tape[rigid + VECTOR_ROW] + size + 1
+    if joints > 0:
+        held = tape[rigid + HELD_ROW]
+        for row in range(rows):
+            store(h, matrix + row, load(h, held + row))
+    else:
+        _put_masses(tape, s, h, n, rigid, size, matrix, rows)
     for j in range(contacts):
         contact = n[tape[rigid + LIST] + j]
         c = contact_at(tape, rigid, contact)
@@ -313,7 +336,7 @@ def _assemble(tape, s, h, n, rigid, size, contacts, joints, rows):
         if has_brake(s, c):
             _assemble_brake(tape, s, h, n, rigid, contact, matrix, work)
     for j in range(joints):
-        _assemble_joint(tape, s, h, n, rigid, n[tape[rigid + HELD] + j], matrix, work)
+        _assemble_joint(tape, s, h, n, rigid, n[tape[rigid + HELD] + j], matrix, work, False)
 
 
 @inner
@@ -354,43 +377,55 @@ def _add_turning(tape, h, n, rigid, matrix, work, i, k, share):
 
 
 @inner
-def _assemble_joint(tape, s, h, n, rigid, j, matrix, work):
-    """Add the products of a joint's rows."""
+def _assemble_joint(tape, s, h, n, rigid, j, matrix, work, locked):
+    """Add the products of those rows of a joint that are always held (``locked``), or of the others that are."""
     joint = joint_at(tape, rigid, j)
     a, b = joint_solids(tape, rigid, joint)
     i = n[tape[rigid + LOCAL] + tape[joint + 1]] if is_free(s, a) else -1
     k = n[tape[rigid + LOCAL] + tape[joint + 2]] if is_free(s, b) else -1
     row = row_at(tape, rigid, tape[joint + 4])
     for _ in range(tape[joint + 5]):
-        if s[row + J_KIND] != OFF:
-            _, gives = row_impulse(s, row, s[row + J_SPEED])
+        kind = s[row + J_KIND]
+        if kind != OFF and (kind == EQUAL) == locked:
+            gives = locked
+            if not locked:
+                _, gives = row_impulse(s, row, s[row + J_SPEED])
             if gives:
                 stiffness = 1.0 / s[row + J_COMPLIANCE]
-                for c in range(3):
-                    force = s[row + J_FORCE + c]
-                    h[work, c] = force * s[a + S_MOVES]
-                    h[work, 3 + c] = s[row + J_TORQUE_A + c]
-                    h[work + 1, c] = -force * s[b + S_MOVES]
-                    h[work + 1, 3 + c] = -s[row + J_TORQUE_B + c]
-                for end in range(2):
-                    h[work + end, 6] = 0.0
-                    h[work + end, 7] = 0.0
+                # Of what turns but does not move the force does nothing.
+                x = load_at(s, row)
+                y = load_at(s, row + W_B)
+                if i >= 0 and s[a + S_MOVES] == 0.0:
+                    x = _without_force(s, h, work, row)
+                if k >= 0 and s[b + S_MOVES] == 0.0:
+                    y = _without_force(s, h, work, row + W_B)
+                store(h, work, x)
+                store(h, work + 1, y)
+                x = splat(stiffness) * x
+                y = splat(stiffness) * y
                 if i >= 0:
-                    _add_product(h, n, rigid, tape, matrix, i, i, work, work, stiffness)
+                    _add_product(h, n, rigid, tape, matrix, i, i, x, work)
                 if k >= 0:
-                    _add_product(h, n, rigid, tape, matrix, k, k, work + 1, work + 1, stiffness)
+                    _add_product(h, n, rigid, tape, matrix, k, k, y, work + 1)
                 if i > k and k >= 0:
-                    _add_product(h, n, rigid, tape, matrix, i, k, work, work + 1, stiffness)
+                    _add_product(h, n, rigid, tape, matrix, i, k, x, work + 1)
                 if k > i and i >= 0:
-                    _add_product(h, n, rigid, tape, matrix, k, i, work + 1, work, stiffness)
+                    _add_product(h, n, rigid, tape, matrix, k, i, y, work)
         row += ROW_ENTRIES
 
 
 @inner
-def _add_product(h, n, rigid, tape, matrix, i, k, one, other, stiffness):
-    """Add stiffness x y^T to block (i, k), with x and y in rows of h."""
+def _without_force(s, h, work, wide):
+    """A wide row's direction with its torques alone."""
+    for c in range(8):
+        h[work, c] = s[wide + c] if c > 2 else 0.0
+    return load(h, work)
+
+
+@inner
+def _add_product(h, n, rigid, tape, matrix, i, k, x, other):
+    """Add x y^T to block (i, k), with y in a row of h."""
     row = matrix + n[tape[rigid + STARTS] + i] + SIX * (k - n[tape[rigid + FIRST] + i])
-    x = splat(stiffness) * load(h, one)
     for c in range(SIX):
         store(h, row + c, fma(splat(h[other, c]), x, load(h, row + c)))
 
