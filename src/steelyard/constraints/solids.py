@@ -12,6 +12,7 @@ from ..kernel import inner
 from ..math.lanes import splat
 from ..math.pointers import LANES
 from ..model.rigid_layout import (
+    JOINTS,
     PACK_ROW,
     REST,
     REST_ROW,
@@ -165,12 +166,13 @@ def gather_solids(tape, s, rigid, k):
             s[at + S_VELOCITY + c] = 0.0
         record += SOLID
         at += SOLID_ENTRIES
-    # One more: the world, to which joints may hold, and scenery belongs.
-    for c in range(SOLID_ENTRIES):
-        s[at + c] = 0.0
-    for c in range(3):
-        s[at + S_ROTATION + 4 * c] = 1.0
-        s[at + S_END_ROTATION + 4 * c] = 1.0
+    if tape[rigid + JOINTS] > 0:
+        # One more: the world, to which joints may hold.
+        for c in range(SOLID_ENTRIES):
+            s[at + c] = 0.0
+        for c in range(3):
+            s[at + S_ROTATION + 4 * c] = 1.0
+            s[at + S_END_ROTATION + 4 * c] = 1.0
 
 
 @inner

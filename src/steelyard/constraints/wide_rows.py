@@ -1,4 +1,4 @@
-"""Rows of contacts and joints as six-vectors of both solids, each in one register.
+"""Rows of joints as six-vectors of both solids, each in one register.
 
 What solvers ask of a row, over and over, is the velocity along it, and what an impulse along it does to the velocities
 of its two solids. Both are made ready once: the direction (force, and its moment on either solid), and the direction

@@ -95,8 +95,7 @@ C_SPINNING, C_ROLLING, C_LIMIT, C_BRAKE_BEFORE, C_BRAKE, C_BRAKE_SPEED, C_BRAKE_
     60,
 )
 C_BRAKE_WEIGHT, C_MOVED = 63, 64
-# Of sweeps: inverse mobilities along the normal and across it, and three wide rows.
-C_STEP, C_WIDE, CONTACT_ENTRIES = 65, 72, 168
+CONTACT_ENTRIES = 65
 
 # Numbers of a joint's end: place and axes in its solid. Entries of a row of a joint: direction of its force, of its
 # torques on a and b, wanted velocity, compliance, impulse of the last pass and of this one, bounds of it, velocity and

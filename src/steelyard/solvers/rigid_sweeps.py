@@ -10,11 +10,16 @@ from __future__ import annotations
 from math import sqrt
 
 from ..constraints.brakes import brake_mobility, has_brake, limit_brake, relative_spin
-from ..constraints.contact_rows import contact_at, contact_ends, length, world_vector
+from ..constraints.contact_rows import (
+    contact_at,
+    contact_ends,
+    length,
+    relative_velocity,
+    world_vector,
+)
 from ..constraints.joint_rows import joint_at, joint_solids, row_at
-from ..constraints.solids import solid_at, symmetric_times
+from ..constraints.solids import symmetric_times
 from ..constraints.wide_rows import (
-    finish_wide_row,
     load_velocity,
     moved,
     response_along,
@@ -39,9 +44,7 @@ from ..model.rigid_layout import (
     C_LEAST,
     C_LIMIT,
     C_NORMAL,
-    C_STEP,
     C_TANGENT,
-    C_WIDE,
     EQUAL,
     HELD,
     ISLAND,
@@ -65,8 +68,6 @@ from ..model.rigid_layout import (
     S_INVERSE_INERTIA,
     S_VELOCITY,
     SETTLED,
-    SOLIDS,
-    WIDE_ROW,
 )
 from ..model.tape import H_RIGID
 from ..stage import stage
@@ -100,47 +101,62 @@ def mobility_along(s, c, solid, arm, direction):
 
 
 @inner
-def _turn(s, solid, x, y, z):
-    """Change a solid's angular velocity by a couple."""
-    a, b, c = symmetric_times(s, solid + S_INVERSE_INERTIA, x, y, z)
-    v = solid + S_VELOCITY + 3
-    s[v] += a
-    s[v + 1] += b
-    s[v + 2] += c
+def _mobility_across(s, c, solid, arm):
+    """What a unit impulse along one tangent does to the velocity along the other."""
+    x, y, z = _moment(s, c, arm, C_TANGENT)
+    a, b, d = symmetric_times(s, solid + S_INVERSE_INERTIA, x, y, z)
+    x, y, z = _moment(s, c, arm, C_BINORMAL)
+    return a * x + b * y + d * z
 
 
 @inner
-def _other(tape, rigid, b):
-    """The second solid of a contact: of scenery the world, which stands still."""
-    return b if b >= 0 else solid_at(tape, rigid, tape[rigid + SOLIDS])
+def _move(s, solid, fx, fy, fz, tx, ty, tz):
+    """Change a solid's velocities by an impulse and its moment."""
+    v = solid + S_VELOCITY
+    inverse = s[solid + S_INVERSE]
+    s[v] += inverse * fx
+    s[v + 1] += inverse * fy
+    s[v + 2] += inverse * fz
+    a, b, c = symmetric_times(s, solid + S_INVERSE_INERTIA, tx, ty, tz)
+    s[v + 3] += a
+    s[v + 4] += b
+    s[v + 5] += c
 
 
 @inner
-def _begin_contact(s, c, a, b, has_b):
-    """Impulses of the stage before, rows and mobilities of a contact."""
+def _push(s, c, a, b, n, t, u):
+    """Change the velocities of both solids by an impulse along normal and tangents."""
+    fx, fy, fz = world_vector(s, c, n, t, u)
+    x = s[c + C_ARM_A]
+    y = s[c + C_ARM_A + 1]
+    z = s[c + C_ARM_A + 2]
+    _move(s, a, fx, fy, fz, y * fz - z * fy, z * fx - x * fz, x * fy - y * fx)
+    if b >= 0:
+        x = s[c + C_ARM_B]
+        y = s[c + C_ARM_B + 1]
+        z = s[c + C_ARM_B + 2]
+        _move(s, b, -fx, -fy, -fz, z * fy - y * fz, x * fz - z * fx, y * fx - x * fy)
+
+
+@inner
+def _begin_contact(s, c, a, b):
+    """Impulses of the stage before, and mobilities of a contact."""
     for k in range(3):
         s[c + C_IMPULSE + k] = s[c + C_BEFORE + k]
         direction = C_NORMAL if k == 0 else (C_TANGENT if k == 1 else C_BINORMAL)
-        ax, ay, az = _moment(s, c, C_ARM_A, direction)
-        bx, by, bz = 0.0, 0.0, 0.0
-        if has_b:
-            bx, by, bz = _moment(s, c, C_ARM_B, direction)
-        wide = c + C_WIDE + WIDE_ROW * k
-        for i in range(3):
-            s[wide + i] = s[c + direction + i]
-        s[wide + 3] = ax
-        s[wide + 4] = ay
-        s[wide + 5] = az
-        s[c + C_DERIVATIVE + k] = finish_wide_row(s, wide, a, b, bx, by, bz)
-    across = response_along(s, c + C_WIDE + WIDE_ROW, c + C_WIDE + 2 * WIDE_ROW)
+        mobility = mobility_along(s, c, a, C_ARM_A, direction)
+        if b >= 0:
+            mobility += mobility_along(s, c, b, C_ARM_B, direction)
+        s[c + C_DERIVATIVE + k] = mobility
+    across = _mobility_across(s, c, a, C_ARM_A)
+    if b >= 0:
+        across += _mobility_across(s, c, b, C_ARM_B)
     # One for both tangents, the largest in their plane: with one each, friction would not be along the slip.
     mean = 0.5 * (s[c + C_DERIVATIVE + 1] + s[c + C_DERIVATIVE + 2])
     half = 0.5 * (s[c + C_DERIVATIVE + 1] - s[c + C_DERIVATIVE + 2])
     s[c + C_DERIVATIVE + 1] = mean + sqrt(half * half + across * across)
     # So far over the mobility.
     s[c + C_COMPLIANCE] *= s[c + C_DERIVATIVE]
-    s[c + C_STEP] = 1.0 / (s[c + C_DERIVATIVE] + s[c + C_COMPLIANCE])
-    s[c + C_STEP + 1] = 1.0 / s[c + C_DERIVATIVE + 1]
 
 
 @inner
@@ -193,7 +209,7 @@ def _begin(tape, s, n, rigid, contacts, joints):
         i = n[tape[rigid + LIST] + j]
         c = contact_at(tape, rigid, i)
         a, b = contact_ends(tape, n, rigid, i)
-        _begin_contact(s, c, a, _other(tape, rigid, b), b >= 0)
+        _begin_contact(s, c, a, b)
         if has_brake(s, c):
             _begin_brake(s, c, a, b)
     for j in range(joints):
@@ -225,36 +241,35 @@ def _sweep_brake(s, c, a, b):
     s[c + C_BRAKE + 1] = l1
     s[c + C_BRAKE + 2] = l2
     x, y, z = world_vector(s, c, l0 - n, l1 - t, l2 - u)
-    _turn(s, a, x, y, z)
+    _move(s, a, 0.0, 0.0, 0.0, x, y, z)
     if b >= 0:
-        _turn(s, b, -x, -y, -z)
+        _move(s, b, 0.0, 0.0, 0.0, -x, -y, -z)
 
 
 @inner
-def _normal_change(s, c, va, vb):
-    """Change of a contact's normal impulse at the velocities of its solids."""
+def _normal_change(s, c, u):
+    """Change of a contact's normal impulse at a normal velocity."""
+    give = s[c + C_COMPLIANCE]
     before = s[c + C_IMPULSE]
-    rest = before + s[c + C_STEP] * (s[c + C_LEAST] - s[c + C_COMPLIANCE] * before)
-    after = rest - s[c + C_STEP] * velocity_along(s, c + C_WIDE, va, vb)
+    after = before + (s[c + C_LEAST] - u - give * before) / (s[c + C_DERIVATIVE] + give)
     return max(after, 0.0) - before
 
 
 @inner
-def _sweep_contact(s, c, a, b, brake_b):
-    """Normal impulse, then friction, of one contact; of spinning and rolling with ``brake_b``, -1 for scenery."""
-    va = load_velocity(s, a)
-    vb = load_velocity(s, b)
-    change = _normal_change(s, c, va, vb)
-    s[c + C_IMPULSE] += change
-    va, vb = moved(s, c + C_WIDE, va, vb, change)
+def _sweep_contact(s, c, a, b):
+    """Normal impulse, then friction, of one contact."""
+    u0, _, _ = relative_velocity(s, c, a, b, S_VELOCITY)
+    change = _normal_change(s, c, u0)
+    if change != 0.0:
+        s[c + C_IMPULSE] += change
+        _push(s, c, a, b, change, 0.0, 0.0)
     most = s[c + C_FRICTION] * (s[c + C_IMPULSE] + s[c + C_HELD])
     l1 = s[c + C_IMPULSE + 1]
     l2 = s[c + C_IMPULSE + 2]
     if most > 0.0 or l1 != 0.0 or l2 != 0.0:
-        first = c + C_WIDE + WIDE_ROW
-        second = first + WIDE_ROW
-        t1 = l1 - s[c + C_STEP + 1] * velocity_along(s, first, va, vb)
-        t2 = l2 - s[c + C_STEP + 1] * velocity_along(s, second, va, vb)
+        _, u1, u2 = relative_velocity(s, c, a, b, S_VELOCITY)
+        t1 = l1 - u1 / s[c + C_DERIVATIVE + 1]
+        t2 = l2 - u2 / s[c + C_DERIVATIVE + 1]
         size = sqrt(t1 * t1 + t2 * t2)
         if size > most:
             share = most / size
@@ -262,12 +277,9 @@ def _sweep_contact(s, c, a, b, brake_b):
             t2 *= share
         s[c + C_IMPULSE + 1] = t1
         s[c + C_IMPULSE + 2] = t2
-        va, vb = moved(s, first, va, vb, t1 - l1)
-        va, vb = moved(s, second, va, vb, t2 - l2)
-    store_velocity(s, a, va)
-    store_velocity(s, b, vb)
+        _push(s, c, a, b, 0.0, t1 - l1, t2 - l2)
     if has_brake(s, c):
-        _sweep_brake(s, c, a, brake_b)
+        _sweep_brake(s, c, a, b)
 
 
 @inner
@@ -336,7 +348,7 @@ def _sweep(tape, s, n, rigid, contacts, joints):
     for j in range(contacts):
         i = n[tape[rigid + LIST] + j]
         a, b = contact_ends(tape, n, rigid, i)
-        _sweep_contact(s, contact_at(tape, rigid, i), a, _other(tape, rigid, b), b)
+        _sweep_contact(s, contact_at(tape, rigid, i), a, b)
 
 
 @inner
@@ -363,15 +375,14 @@ def _mend_worst(tape, s, n, rigid, contacts, joints):
         i = n[tape[rigid + LIST] + j]
         c = contact_at(tape, rigid, i)
         a, b = contact_ends(tape, n, rigid, i)
-        b = _other(tape, rigid, b)
-        change = _normal_change(s, c, load_velocity(s, a), load_velocity(s, b))
-        off = abs(change) * s[c + C_DERIVATIVE]
+        u0, _, _ = relative_velocity(s, c, a, b, S_VELOCITY)
+        off = abs(_normal_change(s, c, u0)) * s[c + C_DERIVATIVE]
         if off > worst:
             worst = off
             contact = i
     if contact >= 0:
         a, b = contact_ends(tape, n, rigid, contact)
-        _sweep_contact(s, contact_at(tape, rigid, contact), a, _other(tape, rigid, b), b)
+        _sweep_contact(s, contact_at(tape, rigid, contact), a, b)
     elif found >= 0:
         a, b = joint_solids(tape, rigid, joint_at(tape, rigid, found))
         _sweep_row(s, found_row, a, b)
@@ -389,7 +400,7 @@ def settle_contact(tape, s, n, rigid):
     for _ in range(_SETTLING):
         l0, l1, l2 = s[c + C_IMPULSE], s[c + C_IMPULSE + 1], s[c + C_IMPULSE + 2]
         b0, b1, b2 = s[c + C_BRAKE], s[c + C_BRAKE + 1], s[c + C_BRAKE + 2]
-        _sweep_contact(s, c, a, _other(tape, rigid, b), b)
+        _sweep_contact(s, c, a, b)
         change = length(s[c + C_IMPULSE] - l0, s[c + C_IMPULSE + 1] - l1, s[c + C_IMPULSE + 2] - l2)
         size = length(s[c + C_IMPULSE], s[c + C_IMPULSE + 1], s[c + C_IMPULSE + 2])
         t = c + C_BRAKE
