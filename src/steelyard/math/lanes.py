@@ -224,7 +224,7 @@ def any_lane(typing_context: Any, condition: Any) -> Any:
 
 @_operation
 def one_lane(typing_context: Any, a: Any, index: Any) -> Any:
-    """The number in a lane, which is known when a kernel is compiled or costs a walk through memory."""
+    """The number of one lane, 0 ... 7."""
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         return builder.extract_element(args[0], args[1])

@@ -164,7 +164,6 @@ def _begin_block(s, row):
     """Inverse of what unit impulses along three rows that are held do to each other, if they can be solved together."""
     second = row + ROW_ENTRIES
     third = second + ROW_ENTRIES
-    s[row + J_BLOCK] = 0.0
     if s[row + J_KIND] == EQUAL and s[second + J_KIND] == EQUAL and s[third + J_KIND] == EQUAL:
         xx = s[row + J_WEIGHT] + s[row + J_COMPLIANCE]
         yy = s[second + J_WEIGHT] + s[second + J_COMPLIANCE]
