@@ -37,7 +37,7 @@ _DT, _LIMIT, _TILT, _PUSH, _PUSH_PAUSE = range(5)
 _POSITION, _VELOCITY, _WEIGHTS, _RATES, _ACCELERATIONS, _NONFINITE = range(6)
 
 
-@sy.kernel
+@sy.inner
 def _begin(mask, values, streams, settings, layout, state):
     """Tilt a fresh platform about its feet and put the load near the balance."""
     for w in range(mask.shape[0]):
@@ -184,14 +184,14 @@ def _observe_block(first, position, velocity, values, state, observations):
         clip(half * feet_x, -5.0, 5.0),
         clip(half * feet_z, -5.0, 5.0),
     )
-    for k in range(13):
-        lanes.store_column(observations, first, k, seen[k])
+    lanes.store_columns(observations, first, seen)
     return pitch, roll
 
 
 @sy.kernel
-def _observe(mask, values, layout, state, observations):
-    """Observations of the worlds of ``mask``, and again of those beside them."""
+def _start(mask, values, streams, settings, layout, state, observations):
+    """Begin an episode in the worlds of ``mask`` and observe them, and again those beside them."""
+    _begin(mask, values, streams, settings, layout, state)
     worlds = mask.shape[0]
     for first in range(0, worlds, lanes.LANES):
         if mask[first : min(first + lanes.LANES, worlds)].any():
@@ -344,8 +344,10 @@ class PlatformTask(Task):
     def start(self, mask: Array) -> None:
         """A fresh platform, tilted."""
         self.world.reset(mask)
-        _begin(mask, self.values, self.streams, self.settings, self.layout, self.world.state)
-        _observe(mask, self.values, self.layout, self.world.state, self.observations)
+        _start(
+            mask, self.values, self.streams, self.settings, self.layout, self.world.state,
+            self.observations,
+        )  # fmt: skip
 
     def step(self, actions: Array) -> int:
         """One control step of all worlds."""

@@ -22,7 +22,7 @@ from .forces.springs import add_springs
 from .integrators.base import Acting, Integrator, Recipe
 from .integrators.motion import damp, drift, kick
 from .kernel import inner
-from .math.array_lanes import load_column, load_row, store_column, store_row
+from .math.array_lanes import load_column, load_row, store_columns, store_row
 from .math.lanes import absolute, any_lane, fma, load, select, splat, sqrt, store
 from .math.pointers import LANES
 from .model import tape
@@ -53,7 +53,7 @@ __all__ = [
     "sqrt",
     "stage",
     "store",
-    "store_column",
+    "store_columns",
     "store_row",
     "tape",
 ]

@@ -26,7 +26,7 @@ from numba.core.typing.templates import AbstractTemplate, infer_global, signatur
 from .pointers import FIRST, LANES
 
 
-def _operation(function: Any) -> Any:
+def operation(function: Any) -> Any:
     """numba's intrinsic, whose first parameter callers do not pass."""
     return intrinsic(function)
 
@@ -107,19 +107,19 @@ def _nothing(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     return context.get_dummy_value()
 
 
-@_operation
+@operation
 def load(typing_context: Any, rows: Any, row: Any) -> Any:
     """Lane vector in row ``row`` of the scratch (rows, LANES), which starts on a cache line."""
     return lane(rows, types.int64), _load
 
 
-@_operation
+@operation
 def store(typing_context: Any, rows: Any, row: Any, value: Any) -> Any:
     """Write a lane vector to row ``row`` of the scratch."""
     return types.void(rows, types.int64, lane), _store
 
 
-@_operation
+@operation
 def load_z(typing_context: Any, rows: Any, row: Any) -> Any:
     """``load`` of a third coordinate: nil in a planar scene."""
     if rows.axes == 2:
@@ -127,13 +127,13 @@ def load_z(typing_context: Any, rows: Any, row: Any) -> Any:
     return lane(rows, types.int64), _load
 
 
-@_operation
+@operation
 def store_z(typing_context: Any, rows: Any, row: Any, value: Any) -> Any:
     """``store`` of a third coordinate: nothing in a planar scene."""
     return types.void(rows, types.int64, lane), _nothing if rows.axes == 2 else _store
 
 
-@_operation
+@operation
 def load_at(typing_context: Any, numbers: Any, entry: Any) -> Any:
     """Lane vector of ``LANES`` neighbouring entries."""
 
@@ -143,7 +143,7 @@ def load_at(typing_context: Any, numbers: Any, entry: Any) -> Any:
     return lane(numbers, types.int64), codegen
 
 
-@_operation
+@operation
 def store_at(typing_context: Any, numbers: Any, entry: Any, value: Any) -> Any:
     """Write a lane vector to ``LANES`` neighbouring entries."""
 
@@ -154,7 +154,7 @@ def store_at(typing_context: Any, numbers: Any, entry: Any, value: Any) -> Any:
     return types.void(numbers, types.int64, lane), codegen
 
 
-@_operation
+@operation
 def splat(typing_context: Any, value: Any) -> Any:
     """The same scalar in every lane."""
 
@@ -178,7 +178,7 @@ def _llvm(name: str, count: int) -> Any:
     return codegen
 
 
-@_operation
+@operation
 def fma(typing_context: Any, a: Any, b: Any, c: Any) -> Any:
     """a * b + c, rounded once."""
     if nil in (a, b):
@@ -188,19 +188,19 @@ def fma(typing_context: Any, a: Any, b: Any, c: Any) -> Any:
     return lane(lane, lane, lane), _llvm("fma", 3)
 
 
-@_operation
+@operation
 def sqrt(typing_context: Any, a: Any) -> Any:
     """Square root, correctly rounded."""
     return lane(lane), _llvm("sqrt", 1)
 
 
-@_operation
+@operation
 def absolute(typing_context: Any, a: Any) -> Any:
     """Absolute value."""
     return lane(lane), _llvm("fabs", 1)
 
 
-@_operation
+@operation
 def select(typing_context: Any, condition: Any, yes: Any, no: Any) -> Any:
     """``yes`` in the lanes where the condition holds, ``no`` in the others."""
     if (yes, no) == (nil, nil):
@@ -212,7 +212,7 @@ def select(typing_context: Any, condition: Any, yes: Any, no: Any) -> Any:
     return lane(mask, lane, lane), codegen
 
 
-@_operation
+@operation
 def any_lane(typing_context: Any, condition: Any) -> Any:
     """True when the condition holds in at least one lane."""
 
@@ -222,7 +222,7 @@ def any_lane(typing_context: Any, condition: Any) -> Any:
     return types.boolean(mask), codegen
 
 
-@_operation
+@operation
 def one_lane(typing_context: Any, a: Any, index: Any) -> Any:
     """The number of one lane, 0 ... 7."""
 
@@ -232,7 +232,7 @@ def one_lane(typing_context: Any, a: Any, index: Any) -> Any:
     return types.float64(lane, types.int64), codegen
 
 
-@_operation
+@operation
 def sum_lanes(typing_context: Any, a: Any) -> Any:
     """Sum of all lanes, halves first: always in the same order."""
 

@@ -154,7 +154,7 @@ def add_contacts(c: Compiler) -> None:
             c.at("acceleration", a), other[4], place, radius(a), restitution, friction,
             c.place(generator, f"multiplier {k}") if staged else -1, c.take(9), c.take(1),
             c.take(7) if staged else -1, -1, len(records) // CONTACT, c.at("start", a), other[5],
-            c.take(6) if staged else -1,
+            c.take(10) if staged else -1,
         ]  # fmt: skip
     c.sections["contacts"] = records
     c.model.blocks = len(c.contacts)
