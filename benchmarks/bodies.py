@@ -136,7 +136,7 @@ def _stack(quick: bool) -> tuple[Any, list[Figure]]:
 def _read_world(world: sy.World) -> tuple[Callable[[], None], Readings]:
     """What steps worlds by five, and what is read of them."""
     readings: Readings = {
-        "energy": lambda: float(world.energy.sum()),
+        "energy": lambda: world.energy.copy(),
         "penetration": lambda: float(world.penetration.max()),
         "gap": lambda: float(world.joints.gap.max(initial=0.0)),
     }
@@ -146,7 +146,7 @@ def _read_world(world: sy.World) -> tuple[Callable[[], None], Readings]:
 def _read_flight(flight: Any) -> tuple[Callable[[], None], Readings]:
     """The same of MuJoCo or Drake."""
     readings: Readings = {
-        "energy": lambda: flight.energy,
+        "energy": lambda: np.array([flight.energy]),
         "penetration": lambda: flight.penetration,
         "gap": lambda: flight.gap,
     }
@@ -154,16 +154,17 @@ def _read_flight(flight: Any) -> tuple[Callable[[], None], Readings]:
 
 
 def _fly(step: Callable[[], None], read: Readings, looks: int) -> dict[str, float]:
-    """Largest of what is read at looks, and of energy the largest gain between them over its whole fall."""
+    """Largest of what is read at looks; of energy the largest gain of a world between them over its whole fall."""
     most = dict.fromkeys((name for name in read if name != "energy"), 0.0)
     energies = [read["energy"]()]
     for _ in range(looks):
         step()
         for name in most:
-            most[name] = max(most[name], read[name]())
+            most[name] = max(most[name], float(read[name]()))
         energies.append(read["energy"]())
-    fall = max(energies[0] - min(energies), 1e-300)
-    return {**most, "gain": max(0.0, float(np.diff(energies).max())) / fall}
+    each = np.array(energies)
+    falls = np.maximum(each[0] - each.min(axis=0), 1e-300)
+    return {**most, "gain": max(0.0, float((np.diff(each, axis=0) / falls).max()))}
 
 
 #: Ways to hold a heap, by name.

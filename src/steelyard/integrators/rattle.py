@@ -47,8 +47,7 @@ class Rattle(Integrator):
             return ((first, 0), (second, 1))
         if solver.rigid:
             kicked, drifted = rattle_parts(acting)
-            # Joints are closed where the step ends, so what holds them drifts too.
-            drift = () if acting.joints else ((drifted, 0),)
+            drift = () if acting.joints and solver.closes_joints else ((drifted, 0),)
             return (
                 (solver.start, 0), (kicked, 0), (solver.stage, 0), *drift, (second, 1), (solver.stage, 1)
             )  # fmt: skip

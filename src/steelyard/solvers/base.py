@@ -23,6 +23,8 @@ class Solver:
 
     #: Whether it holds contacts of bodies and particles as solids, by velocities before the drift.
     rigid: ClassVar[bool] = False
+    #: Whether its position stage moves bodies that are joined, to close joints where the step ends; else drift follows.
+    closes_joints: ClassVar[bool] = False
 
     @property
     def for_bodies(self) -> Solver:

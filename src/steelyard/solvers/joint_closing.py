@@ -12,7 +12,6 @@ from ..constraints.joints import (
     tautness,
 )
 from ..constraints.solids import (
-    drift_by_impulses,
     drift_solids,
     end_drift,
     gather_solids,
@@ -81,13 +80,6 @@ def drift_closed(tape, s, rigid, k):
         at = solid_at(tape, rigid, i)
         for c in range(SIX):
             s[at + S_VELOCITY + c] = s[at + S_BASE + c]
-
-
-@inner
-def drift_as_solved(tape, s, rigid, k, dt):
-    """Drift with the impulses at hand, whatever joints do by that."""
-    drift_by_impulses(tape, s, rigid, k, dt)
-    end_drift(tape, s, rigid, k)
 
 
 @inner

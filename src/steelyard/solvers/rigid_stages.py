@@ -85,7 +85,7 @@ from ..model.tape import COUNT, H_BLOCKS, H_DT, H_RIGID
 from ..stage import Stage, stage
 from .blows import pass_blows, start_velocities
 from .body_settings import BodySettings
-from .joint_closing import close_over_step, drift_as_solved, drift_closed, join_again
+from .joint_closing import close_over_step, drift_closed, join_again
 from .late_contacts import meet_late
 from .rigid_islands import ALL, PUSH, SOFTLY, solve_islands
 from .sleep import (
@@ -285,18 +285,16 @@ def _position_stage(tape, s, n, rigid, k, dt):
     if not soft:
         count = meet_late(tape, s, n, rigid, k, kept, count, dt)
     closed = True
-    if tape[rigid + JOINTS] > 0:
-        if swept:
-            drift_as_solved(tape, s, rigid, k, dt)
-        else:
-            closed = close_over_step(tape, s, n, rigid, k, dt, taut)
-            if not closed and count > 0:
-                # Contacts that limbs wedge push ever harder, pass by pass, and turn joints out of reach.
-                gather_solids(tape, s, rigid, k)
-                begin_joints(tape, s, rigid, k, dt, POSITIONS)
-                solve_islands(tape, s, n, rigid, count, k, SOFTLY)
-                closed = close_over_step(tape, s, n, rigid, k, dt, tautness(tape, s, rigid, k, dt))
-            drift_closed(tape, s, rigid, k)
+    # Sweeps do not close joints: drift follows, as where there are none.
+    if tape[rigid + JOINTS] > 0 and not swept:
+        closed = close_over_step(tape, s, n, rigid, k, dt, taut)
+        if not closed and count > 0:
+            # Contacts that limbs wedge push ever harder, pass by pass, and turn joints out of reach.
+            gather_solids(tape, s, rigid, k)
+            begin_joints(tape, s, rigid, k, dt, POSITIONS)
+            solve_islands(tape, s, n, rigid, count, k, SOFTLY)
+            closed = close_over_step(tape, s, n, rigid, k, dt, tautness(tape, s, rigid, k, dt))
+        drift_closed(tape, s, rigid, k)
     scatter_velocities(tape, s, rigid, k)
     for i in range(count):
         c = contact_at(tape, rigid, i)
