@@ -24,7 +24,7 @@ LOAD, DECK_MASS = 10.0, 4.0
 #: Time in which a small slope grows by e, sqrt(inertia / moment per slope), with the load at the balance [s].
 TOPPLING_TIME = 0.62
 
-# Of rods and contacts over the step cubed, as the error of one step; half of it changes no median or worst error by 5 %.
+# Of rods and contacts over the step cubed, as the error of one step: half of it changes no median error by 5 %.
 _TOLERANCE = 2.5
 
 # Worlds that are worth code of their own.
