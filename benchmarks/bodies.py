@@ -6,6 +6,7 @@ to stands beside the cost: penetration, gaps of joints, and the largest gain of 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, Literal
@@ -21,7 +22,7 @@ from benchmarks.peers.mujoco_bodies import BodyFlight, BodySettings
 STAGES = ("stack", "heap", "ragdoll", "growth", "broad phase", "rays")
 DT = 0.01
 Measured = dict[str, dict[str, float]]
-Readings = dict[str, Callable[[], float]]
+Readings = dict[str, Callable[[], Any]]
 #: Of Drake, by name; none where it is not installed.
 WAYS = drake.WAYS if drake.INSTALLED else {}
 
@@ -153,7 +154,7 @@ def _read_flight(flight: Any) -> tuple[Callable[[], None], Readings]:
     return lambda: flight.step(5), readings
 
 
-def _fly(step: Callable[[], None], read: Readings, looks: int) -> dict[str, float]:
+def watch(step: Callable[[], None], read: Readings, looks: int) -> dict[str, float]:
     """Largest of what is read at looks; of energy the largest gain of a world between them over its whole fall."""
     most = dict.fromkeys((name for name in read if name != "energy"), 0.0)
     energies = [read["energy"]()]
@@ -205,7 +206,7 @@ def _heap(quick: bool) -> tuple[Any, list[Figure]]:
         for dt in (DT, 1 / 60):
             steps = round(seconds / dt)
             key = f"{name}, dt {dt:.4f}"
-            found[key] = _fly(*_read_world(start(solver, dt, starts)), steps // 5)
+            found[key] = watch(*_read_world(start(solver, dt, starts)), steps // 5)
             calls[key] = (
                 lambda solver=solver, dt=dt, steps=steps: start(solver, dt, worlds).step(steps),
                 worlds * seconds,
@@ -220,7 +221,7 @@ def _heap(quick: bool) -> tuple[Any, list[Figure]]:
         flown = 2 if peer is drake_flight else starts
         steps = round(seconds / dt)
         key = f"{name}, dt {dt:.4f}"
-        each = [_fly(*_read_flight(peer(k, dt, how)), steps // 5) for k in range(flown)]
+        each = [watch(*_read_flight(peer(k, dt, how)), steps // 5) for k in range(flown)]
         found[key] = {name: max(one[name] for one in each) for name in each[0]}
 
         def fly(
@@ -330,10 +331,10 @@ def _ragdoll(quick: bool) -> tuple[Any, list[Figure]]:
             peer(index).step(steps)
 
     found = {
-        name: _fly(*_read_world(start(solver, min(worlds, 16))), steps // 5)
+        name: watch(*_read_world(start(solver, min(worlds, 16))), steps // 5)
         for name, solver in SOLVERS.items()
     }
-    each = [_fly(*_read_flight(peer(index)), steps // 5) for index in range(peers)]
+    each = [watch(*_read_flight(peer(index)), steps // 5) for index in range(peers)]
     found["MuJoCo"] = {name: max(one[name] for one in each) for name in each[0]}
     calls: dict[str, tuple[Callable[[], object], float]] = {
         name: (lambda solver=solver: start(solver, worlds).step(steps), float(worlds * steps))
@@ -342,16 +343,22 @@ def _ragdoll(quick: bool) -> tuple[Any, list[Figure]]:
     cost = _timed({**calls, "MuJoCo": (fly, peers * steps)}, 1)
     for name in found:
         found[name]["per_step"] = cost[name]
-    able = {
-        name: cost["MuJoCo"] / cost[name]
-        for name in SOLVERS
-        if found[name]["gap"] <= found["MuJoCo"]["gap"]
-    }
+
+    def over_cheapest(*measures: str) -> float:
+        """Cost of MuJoCo over that of ours which is no worse by these measures."""
+        theirs = found["MuJoCo"]
+        able = (cost[n] for n in SOLVERS if all(found[n][m] <= theirs[m] for m in measures))
+        return cost["MuJoCo"] / min(able, default=math.inf)
+
     return found, [
         Figure(
             name="ragdoll: MuJoCo over the cheapest of ours with joints no more open",
-            measured=max(able.values(), default=0.0),
+            measured=over_cheapest("gap"),
             at_least=8.0,
+        ),
+        Figure(
+            name="ragdoll: the same with no larger gain of energy either",
+            measured=over_cheapest("gap", "gain"),
         ),
         Figure(
             name="ragdoll: gap of joints, proximal Newton",

@@ -19,7 +19,7 @@ from benchmarks.moving_load import taut_motion
 
 pytest.importorskip("mujoco")
 
-from benchmarks import against_mujoco, rest
+from benchmarks import against_mujoco, bodies, rest
 from benchmarks.contests import CONTESTS, Contest
 from benchmarks.flights import EngineFlight, PeerFlight, PeerMethod
 from benchmarks.work_precision import Point
@@ -224,6 +224,13 @@ def test_figure_is_held_against_its_target() -> None:
     assert Figure(name="start", measured=3.1, unit="s", at_most=3.0).met is False
     assert Figure(name="free", measured=1.0).met is None
     assert Figure(name="start", measured=3.1, unit="s", at_most=3.0).target == "<= 3 s"
+
+
+def test_a_world_that_gains_energy_is_seen_beside_one_that_loses_more() -> None:
+    looks = iter([[10.0, 10.0], [4.0, 0.0], [5.0, -6.0]])
+    readings = {"gap": lambda: 1.0, "energy": lambda: np.array(next(looks))}
+    # Gains 1 of the 6 that it fell.
+    assert bodies.watch(lambda: None, readings, 2) == {"gap": 1.0, "gain": pytest.approx(1 / 6)}
 
 
 def test_environment_benchmark_on_an_environment_that_is_always_there() -> None:
