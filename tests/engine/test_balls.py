@@ -59,6 +59,24 @@ def test_momentum_stays_and_energy_does_not_grow(name: str, friction: float) -> 
     assert world.energy[0] < energy[0]
 
 
+@pytest.mark.parametrize("speed", [1.7, 2.0, 2.3])
+@pytest.mark.parametrize("rate", [30, 60, 240])
+def test_balls_that_meet_head_on_without_rebound_go_on_together(rate: int, speed: float) -> None:
+    scene = sy.Scene(gravity=(0, 0, 0))
+    for x, v, mass in ((0.0, speed, 1.0), (1.27, -1.0, 3.0)):
+        scene.add(sy.Particle(position=(x, 0, 0), velocity=(v, 0, 0), mass=mass, radius=0.1))
+    scene.add(sy.Collisions(restitution=0.0))
+    world = sy.World(scene, method=method("Rattle-Direct", dt=1 / rate))
+    for _ in range(rate):
+        world.step()
+        # They carry no load that is more than rounding: there is nothing that could fail to settle.
+        assert world.health[0] == 0
+    expected = (speed - 3.0) / 4.0
+    # Places are held within 1e-12 m, velocities within that over the step.
+    bound = 1e-12 * rate
+    np.testing.assert_allclose(world.particles.velocity[0, :, 0], expected, rtol=0, atol=bound)
+
+
 @pytest.mark.parametrize("restitution", [0.0, 0.5, 1.0])
 def test_the_time_of_a_collision_is_resolved(restitution: float) -> None:
     world = sy.World(pair(restitution), method=method("ImpactRattle-Direct", dt=1 / 60))

@@ -24,7 +24,7 @@ _ITERATIONS = 15
 _ANCHORED = 8
 _SETTLED = 1e-11
 # Share of the allowed motion that errors may make.
-_SHARE = 0.1
+_SHARE = 1e-2
 # Of a contact's work rows: behind its impulses at the start of a solve, and at its anchor.
 _SCALES = 6
 
