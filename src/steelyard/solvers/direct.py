@@ -131,7 +131,10 @@ def _missed(tape, s, skip):
         contact = at + 1 + CONTACT * index
         if skip[tape[contact + 20]] == 0:
             gap = contact_gap(s, tape, contact)
-            loaded = load(s, contact_multiplier(tape, contact, False)) > zero
+            # Newton's method may leave on a contact that it opens a load that moves nothing.
+            mobility = load(s, tape[contact + 7]) + load(s, tape[contact + 8])
+            moved = load(s, contact_multiplier(tape, contact, False)) * mobility
+            loaded = moved > allowed
             possible = load(s, tape[contact + 18]) > splat(0.5)
             missed = missed | (possible & (gap < -allowed)) | (loaded & (gap > allowed))
     return missed
