@@ -456,7 +456,7 @@ class PlatformEnv(TaskEnv):
 
     | method | 50 Hz | 100 Hz | 200 Hz |
     |---|---|---|---|
-    | `"rattle"` | 1.6e-4 m | 4.1e-5 m | 1.0e-5 m |
+    | `"rattle"` | 1.5e-4 m | 3.9e-5 m | 9.8e-6 m |
     | `"symplectic_euler"` | 4.4e-3 m | 2.2e-3 m | 1.1e-3 m |
     | `"gauss_seidel"` | 4.8e-3 m | 2.4e-3 m | 1.1e-3 m |
 
