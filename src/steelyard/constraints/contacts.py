@@ -71,10 +71,7 @@ def contact_targets(tape, s, dt, skip):
         near = (gap < zero) | (gap * gap < reach)
         tolerance = load(s, tape[H_TOLERANCE])
         # A load that moves nothing is rounding, but would push for ever.
-        push = load(s, tape[contact + 15]) * (
-            load(s, tape[contact + 7]) + load(s, tape[contact + 8])
-        )
-        carried = push > splat(_IDLE) * tolerance
+        carried = moved_by_load(tape, s, contact) > splat(_IDLE) * tolerance
         low = gap < splat(-10.0) * tolerance - splat(1e-9)
         leaves = low & (speed * dt > splat(-_RECOVERY) * gap)
         near = (near | carried) & (select(leaves, one, zero) < splat(0.5))
@@ -94,6 +91,13 @@ def contact_targets(tape, s, dt, skip):
         changed = changed or skip[tape[contact + 20]] != left_out or tape[contact] != GROUND
         skip[tape[contact + 20]] = left_out
     return changed
+
+
+@inner
+def moved_by_load(tape, s, contact):
+    """How far [m] the normal impulse of the position stage moves both particles of a contact, were they free."""
+    mobility = load(s, tape[contact + 7]) + load(s, tape[contact + 8])
+    return load(s, contact_multiplier(tape, contact, False)) * mobility
 
 
 @inner

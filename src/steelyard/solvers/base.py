@@ -23,8 +23,11 @@ class Solver:
 
     #: Whether it holds contacts of bodies and particles as solids, by velocities before the drift.
     rigid: ClassVar[bool] = False
-    #: Whether its position stage moves bodies that are joined, to close joints where the step ends; else drift follows.
-    closes_joints: ClassVar[bool] = False
+
+    @property
+    def closes_joints(self) -> bool:
+        """Whether its position stage drifts bodies that are joined, to close joints where the step ends."""
+        return False
 
     @property
     def for_bodies(self) -> Solver:

@@ -21,6 +21,7 @@ from ..constraints.contacts import (
     contact_multiplier,
     contact_shift,
     contact_speed,
+    moved_by_load,
 )
 from ..constraints.links import link_multiplier
 from ..constraints.riders import DECK, HEAD, rider_multiplier, rider_offset, rider_slip
@@ -132,9 +133,7 @@ def _missed(tape, s, skip):
         if skip[tape[contact + 20]] == 0:
             gap = contact_gap(s, tape, contact)
             # Newton's method may leave on a contact that it opens a load that moves nothing.
-            mobility = load(s, tape[contact + 7]) + load(s, tape[contact + 8])
-            moved = load(s, contact_multiplier(tape, contact, False)) * mobility
-            loaded = moved > allowed
+            loaded = moved_by_load(tape, s, contact) > allowed
             possible = load(s, tape[contact + 18]) > splat(0.5)
             missed = missed | (possible & (gap < -allowed)) | (loaded & (gap > allowed))
     return missed

@@ -52,7 +52,6 @@ class ProximalNewton(RigidSolver):
     passes: int = 6
     iterations: int = 60
     exact: ClassVar[bool] = True
-    closes_joints: ClassVar[bool] = True
 
     @property
     def island(self) -> Stage:

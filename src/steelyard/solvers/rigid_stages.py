@@ -125,6 +125,11 @@ class RigidSolver(BodySettings):
         raise NotImplementedError
 
     @property
+    def closes_joints(self) -> bool:
+        """Exact solvers do; sweeps leave joints to the next step, and drift follows."""
+        return self.own_settings.get(N_SWEEPS, 0.0) == 0.0
+
+    @property
     def settings(self) -> tuple[float, ...]:
         """Numbers in the order of the layout."""
         given = {

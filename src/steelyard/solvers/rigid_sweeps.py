@@ -296,12 +296,10 @@ def _sweep_row(s, row, a, b):
     va = load_velocity(s, a)
     vb = load_velocity(s, b)
     change = _row_change(s, row, va, vb)
-    # Most limits are far: who comes next need not wait for what they leave as it is.
-    if change != 0.0:
-        s[row + J_IMPULSE] += change
-        va, vb = moved(s, row, va, vb, change)
-        store_velocity(s, a, va)
-        store_velocity(s, b, vb)
+    s[row + J_IMPULSE] += change
+    va, vb = moved(s, row, va, vb, change)
+    store_velocity(s, a, va)
+    store_velocity(s, b, vb)
 
 
 @inner
